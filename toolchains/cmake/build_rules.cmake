@@ -1,0 +1,46 @@
+# The few rules every folder's CMakeLists.txt is written with. Include paths are the project root (and the generated
+# types), so an #include line names the folder it reaches into: "components/runtime/component.hpp".
+include(GoogleTest)
+
+# One interface target carries language level, warnings and sanitizers; everything we compile links it.
+add_library(adit_build INTERFACE)
+target_compile_features(adit_build INTERFACE cxx_std_20)
+target_compile_options(adit_build INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+                                            -Wno-psabi)
+if(ADIT_WARNINGS_AS_ERRORS)
+  target_compile_options(adit_build INTERFACE -Werror)
+endif()
+target_include_directories(adit_build INTERFACE ${PROJECT_SOURCE_DIR})
+if(ADIT_SANITIZE)
+  target_compile_options(adit_build INTERFACE -fsanitize=${ADIT_SANITIZE} -fno-omit-frame-pointer
+                                              -fno-sanitize-recover=all)
+  target_link_options(adit_build INTERFACE -fsanitize=${ADIT_SANITIZE})
+endif()
+
+# adit_library(NAME SOURCES a.cpp ... [LINKS ...] [PRIVATE_LINKS ...]): a plain library, target adit_NAME.
+# Shared in the developer presets, static in the one-vendor ones (BUILD_SHARED_LIBS decides).
+function(adit_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  add_library(adit_${name} ${ARG_SOURCES})
+  target_link_libraries(adit_${name} PUBLIC adit_build ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS})
+  set_target_properties(adit_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+endfunction()
+
+# adit_test(NAME LABEL unit|contract|loopback|wire|integration|slow SOURCES ... [LINKS ...] [TIMEOUT s] [SERIAL]):
+# one GoogleTest program; each of its tests is a ctest of its own.
+function(adit_test name)
+  cmake_parse_arguments(ARG "SERIAL" "LABEL;TIMEOUT" "SOURCES;LINKS" ${ARGN})
+  if(NOT ADIT_BUILD_TESTS)
+    return()
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 60)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE adit_build ${ARG_LINKS} GTest::gmock_main)
+  set(properties LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  if(ARG_SERIAL)
+    list(APPEND properties RUN_SERIAL ON)
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}." PROPERTIES ${properties})
+endfunction()
