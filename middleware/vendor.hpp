@@ -15,8 +15,13 @@ struct VendorModule {
   Result<std::unique_ptr<Participant>> (*open)(const ParticipantConfig& config, std::string_view participant_user_data);
 };
 
-// Entry point of a vendor's shared module, found by this name with dlsym.
+// Entry point of a vendor's shared module, found by this name with dlsym. A vendor's source defines it as
+// `extern "C" const adit::VendorModule* ADIT_VENDOR_ENTRY_POINT()`: adit_vendor() in CMakeLists.txt sets the name,
+// which carries the vendor's in static builds.
 inline constexpr const char* vendor_entry_point = "adit_vendor_module";
 using VendorEntryPoint = const VendorModule* (*)();
+
+// The bare vendor by name, loaded on first use, without the ROS layer. Thread-safe.
+Result<const VendorModule*> load_vendor(std::string_view name);
 
 }  // namespace adit
