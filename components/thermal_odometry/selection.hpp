@@ -1,0 +1,41 @@
+// Gradient-based pixel selection (paper R25; Engel et al., DSO, 2018, section 3.2, with the grid of LDSO).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "components/thermal_odometry/camera.hpp"
+#include "components/thermal_odometry/pyramid.hpp"
+
+namespace adit::thermal_odometry {
+
+struct Pixel {
+  float u;  // level 0
+  float v;
+  float gradient;  // noise units a pixel
+};
+
+class PixelSelector {
+ public:
+  struct Config {
+    int wanted = 500;
+    float min_gradient = 1.0F;  // noise units a pixel
+    float noise_factor = 4.5F;  // times the gradient noise measured in the flattest tenth of the image
+    int border = 8;             // px
+  };
+  PixelSelector(int width, int height, const Config& config);
+  // The strongest gradient above the threshold in each grid cell. Rather few real points than many of noise: an image
+  // without texture gives next to none. The span is valid until the next call.
+  std::span<const Pixel> select(const Image& image, const Rectifier& rectifier);
+  // Threshold the last call used.
+  float threshold() const { return threshold_; }
+
+ private:
+  Config config_;
+  int cell_;
+  float threshold_ = 0.0F;
+  std::vector<Pixel> selected_;
+  std::vector<float> scratch_;
+};
+
+}  // namespace adit::thermal_odometry

@@ -1,0 +1,78 @@
+// Direct sparse odometry on 16-bit thermal images with LiDAR-anchored depth. One call a frame, one thread, no clock, no
+// allocation after the first keyframes, the same output for the same input bit by bit.
+//
+// Paper: "Thermal-LiDAR fusion for robust tunnel localization", R22-R34; methods: Engel, Koltun, Cremers, "Direct
+// sparse odometry" (PAMI 2018); Gao et al., LDSO (IROS 2018); Shin and Kim, "Sparse depth enhanced direct
+// thermal-infrared SLAM beyond the visible spectrum" (RA-L 2019).
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "components/thermal_odometry/depth_anchor.hpp"
+#include "components/thermal_odometry/estimate.hpp"
+#include "components/thermal_odometry/frame.hpp"
+#include "components/thermal_odometry/front_end.hpp"
+#include "components/thermal_odometry/selection.hpp"
+#include "components/thermal_odometry/tracker.hpp"
+#include "idl/result.hpp"
+
+namespace adit::thermal_odometry {
+
+enum class Mode : std::uint8_t {
+  anchored,  // metric by LiDAR depth; monocular with carried scale while there is none
+  mono,      // the paper's: depth from motion, scale arbitrary
+};
+
+struct Config {
+  Mode mode = Mode::anchored;
+  FrameGate::Config gate;
+  FrontEnd::Config front_end;
+  PixelSelector::Config selection;
+  DepthAnchor::Config anchor;
+  Tracker::Config tracker;
+  int min_points = 150;     // below: low_texture
+  int reference_views = 2;  // keyframes a frame is aligned to jointly
+  double min_keyframe_age_s = 0.3;
+  double max_keyframe_age_s = 1.0;
+  double keyframe_flow = 0.125;  // of the image width, median
+  double min_visible_share = 0.5;
+  double max_cloud_age_s = 0.15;
+  std::size_t max_cloud_points = 1U << 17U;
+  double gap_s = 0.1;                 // longer since the last frame: start coarser, new keyframe
+  int restart_after = 5;              // frames that could not be aligned
+  bool prior_as_information = false;  // besides starting there: add the prior to the normal equations (paper R63)
+  double correlation = 10.0;          // of residuals: covariance = correlation * inverse photometric information
+};
+
+// For pictures: a point of the newest keyframes seen in the newest keyframe (paper R32).
+struct MapPoint {
+  float u;  // px, rectified image of the newest keyframe
+  float v;
+  float depth;  // m or map units
+  bool anchored;
+};
+
+class ThermalOdometry {
+ public:
+  static Result<std::unique_ptr<ThermalOdometry>> create(const CameraModel& camera, const Config& config);
+  ~ThermalOdometry();
+  ThermalOdometry(const ThermalOdometry&) = delete;
+  ThermalOdometry& operator=(const ThermalOdometry&) = delete;
+
+  // Never throws, never NaN. A frame that is not good is counted and changes no pose. `depth`: a cloud that arrived
+  // since the last frame, not newer than this one. The reference is valid until the next call.
+  const Estimate& process(const Frame& frame, const Prior* prior = nullptr, const DepthPoints* depth = nullptr);
+  const Estimate& estimate() const;
+  // Forgets the map and the pose, keeps memory and counters.
+  void reset();
+  // Writes up to out.size() points, returns how many.
+  std::size_t map_points(std::span<MapPoint> out) const;
+
+ private:
+  class Engine;
+  explicit ThermalOdometry(std::unique_ptr<Engine> engine);
+  std::unique_ptr<Engine> engine_;
+};
+
+}  // namespace adit::thermal_odometry

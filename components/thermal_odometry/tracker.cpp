@@ -1,0 +1,361 @@
+#include "components/thermal_odometry/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+namespace adit::thermal_odometry {
+namespace {
+
+constexpr int max_views = 8;
+const Pattern dx = Eigen::Map<const Pattern>(pattern_x.data());
+const Pattern dy = Eigen::Map<const Pattern>(pattern_y.data());
+
+float at_level(float pixel, int level) {
+  return (pixel + 0.5F) / static_cast<float>(1 << level) - 0.5F;
+}
+
+}  // namespace
+
+Eigen::Matrix<float, 2, 6> pixel_jacobian(float fx, float fy, float x, float y, float d) {
+  Eigen::Matrix<float, 2, 6> J;
+  J << fx * d, 0.0F, -fx * d * x, -fx * x * y, fx * (1.0F + x * x), -fx * y,  //
+      0.0F, fy * d, -fy * d * y, -fy * (1.0F + y * y), fy * x * y, fy * x;
+  return J;
+}
+
+// What carries a pixel of one host into the target image at one level.
+struct Tracker::Relative {
+  Eigen::Vector3f base;    // R K^-1 (0, 0, 1)
+  Eigen::Vector3f step_u;  // R K^-1 (1, 0, 0)
+  Eigen::Vector3f step_v;
+  Eigen::Vector3f t;
+  float gain;    // e^(a_j - a_i)
+  float offset;  // b_j - gain b_i
+
+  Relative() = default;
+  Relative(const CameraState& host, const CameraState& target, const Pinhole& camera) {
+    const Pose T = target.T_cw * host.T_cw.inverse();
+    const Eigen::Matrix3f R = T.rotation().cast<float>();
+    t = T.translation().cast<float>();
+    step_u = R.col(0) / static_cast<float>(camera.fx);
+    step_v = R.col(1) / static_cast<float>(camera.fy);
+    base = R.col(2) - step_u * static_cast<float>(camera.cx) - step_v * static_cast<float>(camera.cy);
+    gain = static_cast<float>(std::exp(target.a - host.a));
+    offset = static_cast<float>(target.b - std::exp(target.a - host.a) * host.b);
+  }
+};
+
+Tracker::Tracker(const Pinhole& camera, int levels, std::size_t capacity, const Config& config)
+    : camera_(camera), levels_(levels), config_(config) {
+  views_.reserve(max_views);
+  patches_.reserve(capacity);
+  for (auto& level : templates_) level.reserve(capacity);
+  scratch_.reserve(capacity);
+}
+
+void Tracker::set_reference(std::span<const ReferenceView> views, std::span<const Patch> patches, int newest) {
+  views_.assign(views.begin(), views.end());
+  newest_ = newest;
+  patches_.assign(patches.begin(),
+                  patches.begin() + static_cast<std::ptrdiff_t>(std::min(patches.size(), patches_.capacity())));
+  for (int l = 0; l < levels_; ++l) {
+    auto& templates = templates_[static_cast<std::size_t>(l)];
+    templates.resize(patches_.size());
+    int& count = template_counts_[static_cast<std::size_t>(l)];
+    count = 0;
+    const float c2 = config_.gradient_scale * config_.gradient_scale;
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+      const Patch& patch = patches_[i];
+      Template& entry = templates[i];
+      entry.weight.setZero();
+      const Pyramid* pyramid = views_[static_cast<std::size_t>(patch.host)].image;
+      const float u = at_level(patch.u, l);
+      const float v = at_level(patch.v, l);
+      const bool usable = pyramid != nullptr && samplable(pyramid->level(l), u - 2.0F, v - 2.0F) &&
+                          samplable(pyramid->level(l), u + 2.0F, v + 2.0F);
+      if (!usable) continue;
+      for (int k = 0; k < pattern_size; ++k) {
+        const Sample s = sample(pyramid->level(l), u + dx[k], v + dy[k]);
+        entry.intensity[k] = s.value;
+        entry.weight[k] = c2 / (c2 + s.gx * s.gx + s.gy * s.gy);
+      }
+      ++count;
+    }
+  }
+}
+
+Tracker::System Tracker::linearise(const Pyramid& pyramid, const CameraState& state, int level, float sigma,
+                                   bool with_jacobian) const {
+  System system;
+  const Image& image = pyramid.level(level);
+  const Pinhole camera = camera_.at_level(level);
+  const auto fx = static_cast<float>(camera.fx);
+  const auto fy = static_cast<float>(camera.fy);
+  const auto cx = static_cast<float>(camera.cx);
+  const auto cy = static_cast<float>(camera.cy);
+  std::array<Relative, max_views> relatives;
+  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Relative(views_[h].state, state, camera);
+  const auto& templates = templates_[static_cast<std::size_t>(level)];
+  const float slope_scale = static_cast<float>(1 << level);
+  const float inverse_sigma2 = 1.0F / (sigma * sigma);
+  const float nu = config_.nu;
+  const float right = static_cast<float>(image.width) - 2.01F;
+  const float bottom = static_cast<float>(image.height) - 2.01F;
+
+  Matrix8f block = Matrix8f::Zero();
+  Vector8f block_g = Vector8f::Zero();
+  float block_cost = 0.0F;
+  float block_scale = 0.0F;
+  int in_block = 0;
+  const auto flush = [&] {
+    system.H += block.cast<double>();
+    system.g += block_g.cast<double>();
+    system.cost += block_cost;
+    system.scale += block_scale;
+    block.setZero();
+    block_g.setZero();
+    block_cost = block_scale = 0.0F;
+    in_block = 0;
+  };
+
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const Template& entry = templates[i];
+    if (entry.weight[0] == 0.0F) continue;
+    const Patch& patch = patches_[i];
+    const Relative& relative = relatives[static_cast<std::size_t>(patch.host)];
+    const float u = at_level(patch.u, level);
+    const float v = at_level(patch.v, level);
+    const float d = patch.inverse_depth;
+    // X(k) = centre + du along_u + dv along_v: every pattern pixel on the patch's own plane.
+    const Eigen::Vector3f centre = relative.base + u * relative.step_u + v * relative.step_v + d * relative.t;
+    const Eigen::Vector3f along_u = relative.step_u + patch.slope_u * slope_scale * relative.t;
+    const Eigen::Vector3f along_v = relative.step_v + patch.slope_v * slope_scale * relative.t;
+    const Pattern z = centre.z() + dx * along_u.z() + dy * along_v.z();
+    if (!(z.minCoeff() > 0.05F)) continue;
+    const Pattern rho = z.inverse();
+    const Pattern px = fx * (centre.x() + dx * along_u.x() + dy * along_v.x()) * rho + cx;
+    const Pattern py = fy * (centre.y() + dx * along_u.y() + dy * along_v.y()) * rho + cy;
+    if (!(px.minCoeff() >= 1.0F && py.minCoeff() >= 1.0F && px.maxCoeff() < right && py.maxCoeff() < bottom)) continue;
+    Pattern r;
+    Pattern gx;
+    Pattern gy;
+    for (int k = 0; k < pattern_size; ++k) {
+      const Sample s = sample(image, px[k], py[k]);
+      r[k] = s.value;
+      gx[k] = s.gx;
+      gy[k] = s.gy;
+    }
+    r -= relative.gain * entry.intensity + relative.offset;
+
+    const float rho_c = 1.0F / centre.z();
+    const float x = centre.x() * rho_c;
+    const float y = centre.y() * rho_c;
+    const float d_target = d * rho_c;
+    // An uncertain depth weighs as much as the residual it may cause.
+    const float du_dd = fx * rho_c * (relative.t.x() - relative.t.z() * x);
+    const float dv_dd = fy * rho_c * (relative.t.y() - relative.t.z() * y);
+    const float j2 = (gx * du_dd + gy * dv_dd).square().mean();
+    const float trust = 1.0F / (1.0F + j2 * patch.sigma * patch.sigma * inverse_sigma2);
+    const Pattern normalised = r.square() * inverse_sigma2;
+    const Pattern robust = entry.weight * (nu + 1.0F) / (nu + trust * normalised);
+    ++system.points;
+    system.pixels += pattern_size;
+    system.inliers += static_cast<int>((trust * normalised < 9.0F).count());
+    block_scale += (trust * robust * r.square()).sum();
+    block_cost += (robust * trust * normalised).sum();
+    if (!with_jacobian) {
+      if (++in_block == 64) flush();
+      continue;
+    }
+    const Pattern w = robust * trust * inverse_sigma2;
+    const Pattern ja = -(relative.gain * entry.intensity + (relative.offset - static_cast<float>(state.b)));
+    const Pattern wgx = w * gx;
+    const Pattern wgy = w * gy;
+    Eigen::Matrix2f G;
+    G(0, 0) = (wgx * gx).sum();
+    G(0, 1) = G(1, 0) = (wgx * gy).sum();
+    G(1, 1) = (wgy * gy).sum();
+    const Eigen::Vector2f gr((wgx * r).sum(), (wgy * r).sum());
+    Eigen::Matrix2f affine;  // columns: with a, with b
+    affine << (wgx * ja).sum(), -wgx.sum(), (wgy * ja).sum(), -wgy.sum();
+    const Eigen::Matrix<float, 2, 6> J = pixel_jacobian(fx, fy, x, y, d_target);
+    block.topLeftCorner<6, 6>().noalias() += J.transpose() * (G * J);
+    block.topRightCorner<6, 2>().noalias() += J.transpose() * affine;
+    block_g.head<6>().noalias() += J.transpose() * gr;
+    block(6, 6) += (w * ja.square()).sum();
+    block(6, 7) -= (w * ja).sum();
+    block(7, 7) += w.sum();
+    block_g[6] += (w * ja * r).sum();
+    block_g[7] -= (w * r).sum();
+    if (++in_block == 64) flush();
+  }
+  flush();
+  system.H.bottomLeftCorner<2, 6>() = system.H.topRightCorner<6, 2>().transpose();
+  system.H(7, 6) = system.H(6, 7);
+  if (system.pixels > 0) {
+    system.scale /= system.pixels;
+    system.cost /= system.pixels;
+  }
+  return system;
+}
+
+double Tracker::cost(const Pyramid& image, const CameraState& state, int level) const {
+  CameraState shifted = state;
+  shifted.b += median_offset(image, state, level);
+  const System system = linearise(image, shifted, level, 0.5F * config_.max_sigma, false);
+  if (system.points < config_.min_points / 2) return std::numeric_limits<double>::infinity();
+  const double share =
+      static_cast<double>(system.points) / std::max(1, template_counts_[static_cast<std::size_t>(level)]);
+  return system.cost / std::min(1.0, share + 0.3);
+}
+
+double Tracker::median_offset(const Pyramid& pyramid, const CameraState& state, int level) const {
+  const Image& image = pyramid.level(level);
+  const Pinhole camera = camera_.at_level(level);
+  scratch_.clear();
+  std::array<Relative, max_views> relatives;
+  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Relative(views_[h].state, state, camera);
+  const auto& templates = templates_[static_cast<std::size_t>(level)];
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    if (templates[i].weight[0] == 0.0F) continue;
+    const Patch& patch = patches_[i];
+    const Relative& relative = relatives[static_cast<std::size_t>(patch.host)];
+    const Eigen::Vector3f X = relative.base + at_level(patch.u, level) * relative.step_u +
+                              at_level(patch.v, level) * relative.step_v + patch.inverse_depth * relative.t;
+    if (!(X.z() > 0.05F)) continue;
+    const float px = static_cast<float>(camera.fx) * X.x() / X.z() + static_cast<float>(camera.cx);
+    const float py = static_cast<float>(camera.fy) * X.y() / X.z() + static_cast<float>(camera.cy);
+    if (!samplable(image, px, py)) continue;
+    scratch_.push_back(sample_value(image, px, py) - (relative.gain * templates[i].intensity[4] + relative.offset));
+  }
+  if (scratch_.empty()) return 0.0;
+  const auto middle = scratch_.begin() + static_cast<std::ptrdiff_t>(scratch_.size() / 2);
+  std::nth_element(scratch_.begin(), middle, scratch_.end());
+  return *middle;
+}
+
+float Tracker::median_flow(const CameraState& state) const {
+  scratch_.clear();
+  std::array<Relative, max_views> to_newest;
+  std::array<Relative, max_views> to_current;
+  const CameraState& newest = views_[static_cast<std::size_t>(newest_)].state;
+  for (std::size_t h = 0; h < views_.size(); ++h) {
+    to_newest[h] = Relative(views_[h].state, newest, camera_);
+    to_current[h] = Relative(views_[h].state, state, camera_);
+  }
+  const auto fx = static_cast<float>(camera_.fx);
+  const auto fy = static_cast<float>(camera_.fy);
+  for (const Patch& patch : patches_) {
+    const auto project = [&](const Relative& relative) {
+      return Eigen::Vector3f(relative.base + patch.u * relative.step_u + patch.v * relative.step_v +
+                             patch.inverse_depth * relative.t);
+    };
+    const Eigen::Vector3f before = project(to_newest[static_cast<std::size_t>(patch.host)]);
+    const Eigen::Vector3f after = project(to_current[static_cast<std::size_t>(patch.host)]);
+    if (!(before.z() > 0.05F && after.z() > 0.05F)) continue;
+    scratch_.push_back(std::hypot(fx * (after.x() / after.z() - before.x() / before.z()),
+                                  fy * (after.y() / after.z() - before.y() / before.z())));
+  }
+  if (scratch_.empty()) return 0.0F;
+  const auto middle = scratch_.begin() + static_cast<std::ptrdiff_t>(scratch_.size() / 2);
+  std::nth_element(scratch_.begin(), middle, scratch_.end());
+  return *middle;
+}
+
+float Tracker::correlation(const Pyramid& pyramid, const CameraState& state, int level) const {
+  const Image& image = pyramid.level(level);
+  const Pinhole camera = camera_.at_level(level);
+  std::array<Relative, max_views> relatives;
+  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Relative(views_[h].state, state, camera);
+  const auto& templates = templates_[static_cast<std::size_t>(level)];
+  double n = 0.0;
+  double sum_a = 0.0;
+  double sum_b = 0.0;
+  double sum_aa = 0.0;
+  double sum_ab = 0.0;
+  double sum_bb = 0.0;
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    if (templates[i].weight[0] == 0.0F) continue;
+    const Patch& patch = patches_[i];
+    const Relative& relative = relatives[static_cast<std::size_t>(patch.host)];
+    const Eigen::Vector3f centre = relative.base + at_level(patch.u, level) * relative.step_u +
+                                   at_level(patch.v, level) * relative.step_v + patch.inverse_depth * relative.t;
+    for (int k = 0; k < pattern_size; ++k) {
+      const Eigen::Vector3f X = centre + dx[k] * relative.step_u + dy[k] * relative.step_v;
+      if (!(X.z() > 0.05F)) continue;
+      const float px = static_cast<float>(camera.fx) * X.x() / X.z() + static_cast<float>(camera.cx);
+      const float py = static_cast<float>(camera.fy) * X.y() / X.z() + static_cast<float>(camera.cy);
+      if (!samplable(image, px, py)) continue;
+      const double a = static_cast<double>(relative.gain * templates[i].intensity[k] + relative.offset);
+      const double b = static_cast<double>(sample_value(image, px, py));
+      const double w = templates[i].weight[k] / (1.0 + 1e-4 * a * a);  // a lamp is not the scene
+      n += w;
+      sum_a += w * a;
+      sum_b += w * b;
+      sum_aa += w * a * a;
+      sum_ab += w * a * b;
+      sum_bb += w * b * b;
+    }
+  }
+  const double variance = (n * sum_aa - sum_a * sum_a) * (n * sum_bb - sum_b * sum_b);
+  return variance > 0.0 ? static_cast<float>((n * sum_ab - sum_a * sum_b) / std::sqrt(variance)) : 0.0F;
+}
+
+TrackResult Tracker::track(const Pyramid& image, const CameraState& start, int top_level,
+                           const PosePrior* prior) const {
+  TrackResult result;
+  result.state = start;
+  if (patches_.empty() || views_.empty()) return result;
+  const int top = std::min(top_level, levels_ - 1);
+  const double reference_a = views_[static_cast<std::size_t>(newest_)].state.a;
+  CameraState state = start;
+  state.b += median_offset(image, state, top);
+  float sigma = config_.max_sigma * 0.5F;
+  System system;
+  for (int level = top; level >= std::min(config_.finest_level, top); --level) {
+    for (int iteration = 0; iteration < config_.max_iterations; ++iteration) {
+      system = linearise(image, state, level, sigma, true);
+      if (system.points < config_.min_points / 2) return result;
+      sigma = std::clamp(static_cast<float>(std::sqrt(system.scale)), config_.min_sigma, config_.max_sigma);
+      Eigen::Matrix<double, 8, 8> H = system.H;
+      Eigen::Matrix<double, 8, 1> g = system.g;
+      const double gain_information = 1.0 / (config_.gain_sigma * config_.gain_sigma);
+      H(6, 6) += gain_information;
+      g[6] += gain_information * (state.a - reference_a);
+      if (prior != nullptr) {
+        H.topLeftCorner<6, 6>() += prior->information;
+        g.head<6>() += prior->information * se3_log(state.T_cw * prior->T_cw.inverse());
+      }
+      H.diagonal() *= 1.0001;
+      const Eigen::Matrix<double, 8, 1> step = -H.ldlt().solve(g);
+      if (!step.allFinite() || step.head<6>().norm() > 10.0) return result;
+      state.T_cw = se3_exp(step.head<6>()) * state.T_cw;
+      state.a += step[6];
+      state.b += step[7];
+      if (step.head<3>().norm() < config_.stop_translation && step.segment<3>(3).norm() < config_.stop_rotation) break;
+    }
+  }
+  const int finest = std::min(config_.finest_level, top);
+  system = linearise(image, state, finest, sigma, true);
+  state.T_cw.linear() = orthonormalized(state.T_cw.linear());
+  result.state = state;
+  result.sigma = static_cast<float>(std::sqrt(system.scale));
+  result.points = system.points;
+  const int templates = std::max(1, template_counts_[static_cast<std::size_t>(finest)]);
+  result.visible_share = static_cast<float>(system.points) / static_cast<float>(templates);
+  result.inlier_share = static_cast<float>(system.inliers) / static_cast<float>(std::max(1, system.pixels));
+  result.correlation = correlation(image, state, finest);
+  result.median_flow = median_flow(state);
+  const Eigen::Matrix2d Haa = system.H.bottomRightCorner<2, 2>() + 1e-6 * Eigen::Matrix2d::Identity();
+  result.information = system.H.topLeftCorner<6, 6>() -
+                       system.H.topRightCorner<6, 2>() * Haa.inverse() * system.H.bottomLeftCorner<2, 6>();
+  result.ok = state.T_cw.matrix().allFinite() && system.points >= config_.min_points &&
+              result.visible_share >= config_.min_visible_share && result.inlier_share >= config_.min_inlier_share &&
+              result.correlation >= config_.min_correlation && result.sigma < 1.5F * config_.max_sigma;
+  return result;
+}
+
+}  // namespace adit::thermal_odometry
