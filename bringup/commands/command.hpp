@@ -1,0 +1,28 @@
+// The commands of `adit`. Each adds itself to the program and sets the exit code when it was chosen.
+#pragma once
+
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "idl/result.hpp"
+#include "middleware/config.hpp"
+
+namespace adit {
+
+// 0: done; 1: the work failed or a check found something; 2: wrong arguments (CLI11's own errors included).
+using ExitCode = int;
+
+void add_evaluate_command(CLI::App& app, ExitCode& code);
+void add_topic_command(CLI::App& app, ExitCode& code);
+void add_node_command(CLI::App& app, ExitCode& code);
+void add_doctor_command(CLI::App& app, ExitCode& code);
+void add_explain_command(CLI::App& app, ExitCode& code);
+
+// --middleware, --domain, --network, --peer, --ros-distro into `config`; defaults from $ADIT_MIDDLEWARE, $ADIT_DOMAIN.
+void add_participant_options(CLI::App& app, ParticipantConfig& config);
+
+// Prints "adit: <message>" on stderr and returns 1.
+ExitCode fail(const Error& error);
+
+}  // namespace adit

@@ -1,0 +1,15 @@
+// The `adit` program: one command a file in commands/.
+#include "bringup/commands/command.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app("Adit: DDS components and tunnel localization", "adit");
+  app.require_subcommand(1);
+  adit::ExitCode code = 0;
+  adit::add_topic_command(app, code);
+  adit::add_node_command(app, code);
+  adit::add_doctor_command(app, code);
+  adit::add_explain_command(app, code);
+  adit::add_evaluate_command(app, code);
+  CLI11_PARSE(app, argc, argv);
+  return code;
+}
