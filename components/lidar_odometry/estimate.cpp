@@ -1,0 +1,46 @@
+#include "components/lidar_odometry/estimate.hpp"
+
+#include <algorithm>
+
+namespace adit::lidar_odometry {
+
+std::string_view to_string(Status status) {
+  switch (status) {
+    case Status::initialising:
+      return "initialising";
+    case Status::ok:
+      return "ok";
+    case Status::degenerate:
+      return "degenerate";
+    case Status::too_few_points:
+      return "too few points";
+    case Status::bad_stamp:
+      return "bad stamp";
+    case Status::bad_cloud:
+      return "bad cloud";
+    case Status::lost:
+      return "lost";
+    case Status::restarted:
+      return "restarted";
+  }
+  return "unknown";
+}
+
+bool registered(Status status) {
+  return status == Status::ok || status == Status::degenerate;
+}
+
+int Localizability::unobservable() const {
+  const auto count = [](const std::array<Direction, 3>& directions) {
+    return std::count_if(directions.begin(), directions.end(), [](const Direction& d) { return !d.observable; });
+  };
+  return static_cast<int>(count(translation) + count(rotation));
+}
+
+Matrix6d covariance_in_parent_axes(const Pose& pose, const Matrix6d& covariance) {
+  Matrix6d rotation = Matrix6d::Zero();
+  rotation.topLeftCorner<3, 3>() = rotation.bottomRightCorner<3, 3>() = pose.linear();
+  return rotation * covariance * rotation.transpose();
+}
+
+}  // namespace adit::lidar_odometry

@@ -1,0 +1,184 @@
+#include "components/lidar_odometry/lidar_odometry.hpp"
+
+#include <cmath>
+
+#include "components/lidar_odometry/localizability.hpp"
+#include "components/lidar_odometry/point_odometry.hpp"
+
+namespace adit::lidar_odometry {
+namespace {
+
+constexpr double ns = 1e-9;
+// Clouds with stamps that go on from each other before a clock that was set back is believed.
+constexpr int stamps_to_believe = 3;
+
+// Finite, and the rotation is one within what single precision leaves.
+bool usable(const Prior& prior) {
+  const Eigen::Matrix3d r = prior.pose.linear();
+  const bool twist_finite = !prior.twist || prior.twist->allFinite();
+  return prior.pose.matrix().allFinite() && prior.information.allFinite() && twist_finite &&
+         (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-3 && r.determinant() > 0.0 &&
+         prior.pose.translation().norm() < 1e7;
+}
+
+std::unique_ptr<Pipeline> make_pipeline(const Config& config, WorkerPool& pool) {
+  return std::make_unique<PointOdometry>(config, pool);
+}
+
+}  // namespace
+
+struct LidarOdometry::Impl {
+  explicit Impl(const Config& c) : config(c), pool(c.threads), pipeline(make_pipeline(c, pool)) {}
+
+  // The local map's frame starts at the first pose; the odometry frame is where an absolute prior puts it.
+  Config config;
+  WorkerPool pool;
+  std::unique_ptr<Pipeline> pipeline;
+  Estimate estimate;
+  bool started = false;
+  Pose odom_map = Pose::Identity();
+  Pose map_sensor = Pose::Identity();
+  Vector6d twist = Vector6d::Zero();
+  int lost_in_a_row = 0;
+  std::int64_t refused_stamp = 0;  // of the last cloud refused for its stamp
+  int refused_in_a_row = 0;
+
+  double reference_time(const std::optional<TimeSpan>& times) const;
+  bool accept_stamp(std::int64_t stamp_ns);
+  void finish();
+  void process(const Cloud& cloud, const Prior* prior);
+};
+
+double LidarOdometry::Impl::reference_time(const std::optional<TimeSpan>& times) const {
+  if (!times) return 0.0;
+  const bool end = config.deskew && config.mode != Mode::genz;
+  return end ? times->last : 0.5 * (times->first + times->last);
+}
+
+// A stamp must be later than the last one. One that is not is refused, until a few in a row show a new time base.
+bool LidarOdometry::Impl::accept_stamp(std::int64_t stamp_ns) {
+  if (!started || stamp_ns > estimate.stamp_ns) {
+    refused_in_a_row = 0;
+    return true;
+  }
+  refused_in_a_row = refused_in_a_row > 0 && stamp_ns > refused_stamp ? refused_in_a_row + 1 : 1;
+  refused_stamp = stamp_ns;
+  if (refused_in_a_row < stamps_to_believe) return false;
+  refused_in_a_row = 0;
+  return true;
+}
+
+void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
+  ++estimate.total.clouds;
+  estimate.scan = {};
+  estimate.scan.points = static_cast<std::uint32_t>(cloud.points.size());
+  estimate.information.setZero();
+  estimate.localizability = {};
+  if (!consistent(cloud)) {
+    estimate.status = Status::bad_cloud;
+    ++estimate.total.refused;
+    return finish();
+  }
+  SweepTask task{.cloud = cloud};
+  task.times = time_span(cloud);
+  task.reference_time = reference_time(task.times);
+  const std::int64_t stamp_ns = cloud.stamp_ns + std::llround(task.reference_time / ns);
+  if (!accept_stamp(stamp_ns)) {
+    estimate.status = Status::bad_stamp;
+    ++estimate.total.refused;
+    return finish();
+  }
+
+  task.dt = started && stamp_ns > estimate.stamp_ns ? ns * static_cast<double>(stamp_ns - estimate.stamp_ns) : 0.0;
+  if (prior != nullptr && !usable(*prior)) {
+    ++estimate.total.bad_priors;
+    prior = nullptr;
+  }
+  if (!started && prior != nullptr && prior->kind == Prior::Kind::absolute) {
+    odom_map = prior->pose;
+    odom_map.linear() = orthonormalized(odom_map.linear());
+  }
+  task.last = map_sensor;
+  task.prediction = map_sensor;
+  const bool coasting = task.dt > 0.0 && task.dt <= config.max_gap_s;
+  if (coasting) {
+    task.twist = twist;
+    task.prediction = map_sensor * se3_exp(task.dt * twist);
+  }
+  if (started && prior != nullptr) {
+    task.external = true;
+    task.information = prior->information;
+    task.prediction =
+        prior->kind == Prior::Kind::absolute ? odom_map.inverse() * prior->pose : map_sensor * prior->pose;
+    if (coasting) task.twist = se3_log(map_sensor.inverse() * task.prediction) / task.dt;
+  }
+  if (prior != nullptr && prior->twist) task.twist = *prior->twist;
+  task.prediction.linear() = orthonormalized(task.prediction.linear());
+
+  pipeline->process(task, estimate);
+  const bool placed = registered(estimate.status) || estimate.status == Status::initialising;
+  if (registered(estimate.status)) {
+    ++estimate.total.registered;
+    if (estimate.status == Status::degenerate) ++estimate.total.degenerate;
+  } else if (estimate.status == Status::too_few_points) {
+    ++estimate.total.refused;
+    if (!started) return finish();
+  }
+  lost_in_a_row = placed || estimate.status == Status::too_few_points ? 0 : lost_in_a_row + 1;
+  if (estimate.status == Status::lost) {
+    ++estimate.total.lost;
+    if (lost_in_a_row >= config.restart_after) {
+      pipeline->reset();
+      pipeline->process(task, estimate);
+      estimate.status = Status::restarted;
+      ++estimate.total.restarts;
+      lost_in_a_row = 0;
+    }
+  }
+  if (task.dt > 0.0 && registered(estimate.status)) {
+    twist = se3_log(map_sensor.inverse() * estimate.pose) / task.dt;
+  } else if (!coasting) {
+    twist.setZero();
+  }
+  map_sensor = estimate.pose;
+  estimate.stamp_ns = stamp_ns;
+  started = true;
+  finish();
+}
+
+// From the local map's frame to the caller's.
+void LidarOdometry::Impl::finish() {
+  estimate.pose = odom_map * map_sensor;
+  estimate.twist = twist;
+  estimate.covariance = bounded_covariance(estimate.information);
+}
+
+LidarOdometry::LidarOdometry(const Config& config) : impl_(std::make_unique<Impl>(config)) {}
+LidarOdometry::~LidarOdometry() = default;
+LidarOdometry::LidarOdometry(LidarOdometry&&) noexcept = default;
+LidarOdometry& LidarOdometry::operator=(LidarOdometry&&) noexcept = default;
+
+const Estimate& LidarOdometry::process(const Cloud& cloud, const Prior* prior) {
+  impl_->process(cloud, prior);
+  return impl_->estimate;
+}
+
+std::int64_t LidarOdometry::reference_stamp_ns(const Cloud& cloud) const {
+  if (!consistent(cloud)) return cloud.stamp_ns;
+  return cloud.stamp_ns + std::llround(impl_->reference_time(time_span(cloud)) / ns);
+}
+
+const Estimate& LidarOdometry::estimate() const {
+  return impl_->estimate;
+}
+
+void LidarOdometry::reset() {
+  impl_->pipeline->reset();
+  impl_->estimate = {};
+  impl_->started = false;
+  impl_->odom_map = impl_->map_sensor = Pose::Identity();
+  impl_->twist.setZero();
+  impl_->lost_in_a_row = impl_->refused_in_a_row = 0;
+}
+
+}  // namespace adit::lidar_odometry

@@ -1,0 +1,109 @@
+// Runs the odometry over the shared recordings and prints its figures; for studies, not a test.
+//   lidar_odometry_study synthetic kiss|genz|default raw|deskew [scans]
+//   lidar_odometry_study subt kiss|genz|default [max_range] [voxel]
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "components/lidar_odometry/lidar_odometry.hpp"
+#include "components/lidar_odometry/test_data.hpp"
+
+using namespace adit;
+using namespace adit::lidar_odometry;
+
+namespace {
+
+std::vector<Pose> poses_of(const std::string& path) {
+  std::vector<Pose> poses;
+  const Result<Trajectory> trajectory = read_tum(path);
+  if (!trajectory) {
+    std::fprintf(stderr, "%s\n", trajectory.error().message.c_str());
+    return poses;
+  }
+  for (const StampedPose& p : *trajectory) poses.push_back(p.pose);
+  return poses;
+}
+
+void print(const char* name, const TrajectoryError& e) {
+  std::printf("%-28s ATE %.3f m  end %.3f m %.2f %% %.2f deg\n", name, e.ate, e.end, e.end_percent, e.end_degrees);
+}
+
+int synthetic(Config config, bool deskew) {
+  const std::string folder = *shared_data("synthetic_lidar_64x512");
+  config.deskew = deskew;
+  LidarOdometry odometry(config);
+  std::vector<Pose> estimate;
+  const std::vector<Pose> start = poses_of(folder + "/gt_start.tum");
+  const std::vector<Pose> mid = poses_of(folder + "/gt_mid.tum");
+  const std::vector<Pose> end = poses_of(folder + "/gt_end.tum");
+  const bool genz = config.mode == Mode::genz;
+  const std::string name = std::string(genz ? "genz" : "kiss") + (deskew ? "_deskew" : "_raw");
+  const std::vector<Pose> published = poses_of(folder + "/reference_" + name + ".tum");
+  std::size_t i = 0;
+  for (const RecordedSweep& sweep : read_sweeps(folder)) {
+    const Estimate& e = odometry.process(sweep.cloud());
+    estimate.push_back(e.pose);
+    const double step = i > 0 ? (estimate[i - 1].inverse() * estimate[i]).translation().norm() : 0.0;
+    const double truth = i > 0 ? (mid[i - 1].inverse() * mid[i]).translation().norm() : 0.0;
+    const double other = i > 0 ? (published[i - 1].inverse() * published[i]).translation().norm() : 0.0;
+    std::printf(
+        "%2zu %-12s step %.3f published %.3f truth %.3f  n %u matched %u solves %u cap %d rms %.3f alpha %.2f cells %u "
+        "weak %d s %.4f\n",
+        i, std::string(to_string(e.status)).c_str(), step, other, truth, e.scan.registered, e.scan.matched,
+        e.scan.solves, e.scan.iteration_cap, e.scan.rms_residual, e.scan.planar_ratio, e.scan.map_cells,
+        e.localizability.unobservable(), e.localizability.translation[0].sigma);
+    ++i;
+  }
+  print("ours vs mid", trajectory_error(mid, estimate));
+  print("ours vs end", trajectory_error(end, estimate));
+  print("published vs mid", trajectory_error(mid, published));
+  print("published vs end", trajectory_error(end, published));
+  print("ours vs published", trajectory_error(published, estimate));
+  return 0;
+}
+
+int subt(const Config& config, double sigma_t, double sigma_r) {
+  const std::string folder = *shared_data("subt_anymal_vlp16");
+  LidarOdometry odometry(config);
+  const std::vector<Pose> stored = poses_of(folder + "/maplab_lidar.tum");
+  const std::vector<Pose> reference = poses_of(folder + "/ref_lidar.tum");
+  std::vector<Pose> estimate;
+  for (const RecordedSweep& sweep : read_sweeps(folder)) {
+    const std::size_t i = estimate.size();
+    Prior prior;
+    if (i > 0) prior.pose = stored[i - 1].inverse() * stored[i];
+    if (sigma_t > 0.0) {
+      prior.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (sigma_t * sigma_t)),
+          Eigen::Vector3d::Constant(1.0 / (sigma_r * sigma_r));
+    }
+    const Estimate& e = odometry.process(sweep.cloud(), &prior);
+    estimate.push_back(e.pose);
+    const Pose d = (reference[0].inverse() * reference[i]).inverse() * (estimate[0].inverse() * e.pose);
+    const Pose p = i == 0 ? Pose::Identity() : Pose((reference[i - 1].inverse() * reference[i]).inverse() * prior.pose);
+    std::printf(
+        "%2zu %-12s error %.3f m %.2f deg  prior step error %.3f m %.2f deg  n %u matched %u solves %u cap %d rms %.3f "
+        "cells %u weak %d\n",
+        i, std::string(to_string(e.status)).c_str(), d.translation().norm(), so3_log(d.linear()).norm() * 57.29578,
+        p.translation().norm(), so3_log(p.linear()).norm() * 57.29578, e.scan.registered, e.scan.matched, e.scan.solves,
+        e.scan.iteration_cap, e.scan.rms_residual, e.scan.map_cells, e.localizability.unobservable());
+  }
+  print("ours vs reference", trajectory_error(reference, estimate));
+  print("stored vs reference", trajectory_error(reference, stored));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto arg = [&](int i) { return std::string(argc > i ? argv[i] : ""); };
+  Config config;
+  config.mode = mode_from_string(arg(2)).value_or(Mode::kiss);
+  if (arg(1) == "synthetic") return synthetic(config, arg(3) != "raw");
+  if (arg(1) == "subt") {
+    if (argc > 3) config.max_range = std::atof(argv[3]);
+    if (argc > 4) config.kiss.voxel_size = config.genz.voxel_size = std::atof(argv[4]);
+    if (argc > 5) config.kiss.initial_threshold = config.genz.initial_threshold = std::atof(argv[5]);
+    return subt(config, argc > 6 ? std::atof(argv[6]) : 0.0, argc > 7 ? std::atof(argv[7]) : 1.0);
+  }
+  return 1;
+}

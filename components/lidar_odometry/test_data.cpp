@@ -1,0 +1,111 @@
+#include "components/lidar_odometry/test_data.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <numbers>
+#include <sstream>
+
+namespace adit::lidar_odometry {
+
+Cloud RecordedSweep::cloud() const {
+  Cloud cloud;
+  cloud.stamp_ns = stamp_ns;
+  cloud.points = std::span<const Point3f>(points);
+  cloud.seconds = std::span<const float>(seconds);
+  cloud.rings = std::span<const std::uint16_t>(rings);
+  cloud.width = width;
+  cloud.height = height;
+  return cloud;
+}
+
+std::optional<std::string> shared_data(const std::string& name) {
+  const char* given = std::getenv("ADIT_SHARED");
+  const std::filesystem::path shared = given != nullptr ? given : ADIT_SOURCE_DIR "/../shared";
+  const std::filesystem::path folder = shared / "data" / name;
+  if (!std::filesystem::exists(folder)) return std::nullopt;
+  return folder.string();
+}
+
+namespace {
+
+std::vector<char> read_bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+RecordedSweep read_sweep(const std::string& path, std::size_t count) {
+  const std::vector<char> bytes = read_bytes(path);
+  const std::size_t columns = count > 0 ? bytes.size() / (4 * count) : 4;
+  RecordedSweep sweep;
+  for (std::size_t i = 0; i + 4 * columns <= bytes.size(); i += 4 * columns) {
+    float record[6] = {};
+    std::memcpy(record, &bytes[i], 4 * std::min<std::size_t>(columns, 6));
+    sweep.points.emplace_back(record[0], record[1], record[2]);
+    if (columns >= 5) sweep.seconds.push_back(record[4]);
+    if (columns >= 6) sweep.rings.push_back(static_cast<std::uint16_t>(record[5]));
+  }
+  return sweep;
+}
+
+}  // namespace
+
+std::vector<RecordedSweep> read_sweeps(const std::string& folder, std::int64_t stamp_unit_ns) {
+  std::vector<RecordedSweep> sweeps;
+  std::ifstream index(folder + "/scans/index.txt");
+  for (std::string line; std::getline(index, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream fields(line);
+    std::string name;
+    std::int64_t stamp = 0;
+    std::size_t count = 0;
+    fields >> name;
+    if (stamp_unit_ns > 0) fields >> stamp;
+    fields >> count;
+    RecordedSweep sweep = read_sweep(folder + "/scans/" + name, count);
+    sweep.stamp_ns = stamp_unit_ns > 0 ? stamp * stamp_unit_ns : static_cast<std::int64_t>(sweeps.size()) * 100'000'000;
+    sweeps.push_back(std::move(sweep));
+  }
+  return sweeps;
+}
+
+std::vector<Point3f> read_ply(const std::string& path) {
+  const std::vector<char> bytes = read_bytes(path);
+  const std::string_view text(bytes.data(), bytes.size());
+  const std::string_view end = "end_header\n";
+  const std::size_t body = text.find(end);
+  std::vector<Point3f> points;
+  if (body == std::string_view::npos) return points;
+  for (std::size_t i = body + end.size(); i + 16 <= bytes.size(); i += 16) {
+    Point3f point;
+    std::memcpy(point.data(), &bytes[i], 12);
+    points.push_back(point);
+  }
+  return points;
+}
+
+TrajectoryError trajectory_error(const std::vector<Pose>& truth, const std::vector<Pose>& estimate) {
+  TrajectoryError error;
+  const Eigen::Index n = static_cast<Eigen::Index>(truth.size());
+  Eigen::Matrix3Xd a(3, n), b(3, n);
+  double length = 0.0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    a.col(i) = estimate[static_cast<std::size_t>(i)].translation();
+    b.col(i) = truth[static_cast<std::size_t>(i)].translation();
+    if (i > 0) length += (b.col(i) - b.col(i - 1)).norm();
+  }
+  const Eigen::Matrix4d alignment = Eigen::umeyama(a, b, false);
+  const Eigen::Matrix3Xd aligned =
+      (alignment.topLeftCorner<3, 3>() * a).colwise() + alignment.topRightCorner<3, 1>().col(0);
+  error.ate = std::sqrt((aligned - b).colwise().squaredNorm().mean());
+  const Pose difference =
+      (truth.front().inverse() * truth.back()).inverse() * (estimate.front().inverse() * estimate.back());
+  error.end = difference.translation().norm();
+  error.end_percent = length > 0.0 ? 100.0 * error.end / length : 0.0;
+  error.end_degrees = so3_log(difference.linear()).norm() * 180.0 / std::numbers::pi;
+  return error;
+}
+
+}  // namespace adit::lidar_odometry
