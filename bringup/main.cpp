@@ -5,6 +5,8 @@ int main(int argc, char** argv) {
   CLI::App app("Adit: DDS components and tunnel localization", "adit");
   app.require_subcommand(1);
   adit::ExitCode code = 0;
+  adit::add_run_command(app, code);
+  adit::add_host_command(app, code);
   adit::add_topic_command(app, code);
   adit::add_node_command(app, code);
   adit::add_doctor_command(app, code);

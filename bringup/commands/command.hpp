@@ -13,6 +13,8 @@ namespace adit {
 // 0: done; 1: the work failed or a check found something; 2: wrong arguments (CLI11's own errors included).
 using ExitCode = int;
 
+void add_run_command(CLI::App& app, ExitCode& code);
+void add_host_command(CLI::App& app, ExitCode& code);
 void add_evaluate_command(CLI::App& app, ExitCode& code);
 void add_topic_command(CLI::App& app, ExitCode& code);
 void add_node_command(CLI::App& app, ExitCode& code);

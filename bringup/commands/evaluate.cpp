@@ -1,5 +1,8 @@
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
+
+#include <nlohmann/json.hpp>
 
 #include "bringup/commands/command.hpp"
 #include "bringup/evaluation/report.hpp"
@@ -14,6 +17,7 @@ struct Arguments {
   std::string truth;
   std::vector<std::string> estimates;  // NAME=FILE
   std::string out;
+  std::string run;  // what `adit run --summary` wrote
   std::string alignment = "first_pose";
   ev::Options options;
 };
@@ -37,6 +41,26 @@ Result<std::vector<ev::Evaluation>> evaluate_all(const Arguments& arguments, con
   return evaluations;
 }
 
+// Adds a live run's links, CPU and real-time factor to the summary of its trajectories.
+Result<void> add_run_figures(const std::string& summary_path, const std::string& run_path, double duration_s) {
+  std::ifstream summary_file(summary_path), run_file(run_path);
+  nlohmann::json summary = nlohmann::json::parse(summary_file, nullptr, false);
+  const nlohmann::json run = nlohmann::json::parse(run_file, nullptr, false);
+  if (!run.is_object() || !run.contains("wall_s")) {
+    return Error{ErrorCode::malformed, run_path + ": not a file that `adit run --summary` wrote"};
+  }
+  for (const char* key : {"middleware", "links", "cpu_s", "processes", "wall_s"}) {
+    if (run.contains(key)) summary[key] = run[key];
+  }
+  const double wall_s = run["wall_s"];
+  summary["realtime_factor"] = wall_s > 0.0 ? duration_s / wall_s : 0.0;
+  std::ofstream out(summary_path);
+  out << summary.dump(2) << '\n';
+  out.flush();
+  if (!out) return Error{ErrorCode::io, summary_path + ": cannot write"};
+  return {};
+}
+
 Result<void> run(Arguments& arguments) {
   const Result<ev::Alignment> alignment = ev::parse_alignment(arguments.alignment);
   if (!alignment) return alignment.error();
@@ -56,6 +80,12 @@ Result<void> run(Arguments& arguments) {
   if (Result<void> written = ev::write_report(arguments.out + "/report.html", *truth, *evaluations); !written) {
     return written;
   }
+  if (!arguments.run.empty()) {
+    const double duration_s = evaluations->front().truth_duration_s;
+    if (Result<void> added = add_run_figures(arguments.out + "/summary.json", arguments.run, duration_s); !added) {
+      return added;
+    }
+  }
   std::printf("wrote %s/summary.json and report.html\n", arguments.out.c_str());
   return {};
 }
@@ -69,6 +99,8 @@ void add_evaluate_command(CLI::App& app, ExitCode& code) {
   command->add_option("--truth", arguments->truth, "TUM file")->required()->check(CLI::ExistingFile);
   command->add_option("--estimate", arguments->estimates, "NAME=FILE.tum (repeatable)")->required();
   command->add_option("--out", arguments->out, "folder for summary.json and report.html");
+  command->add_option("--run", arguments->run, "figures of the live run (adit run --summary) to add to summary.json")
+      ->check(CLI::ExistingFile);
   command->add_option("--align", arguments->alignment, "none, first_pose, se3 or sim3")->capture_default_str();
   command->add_flag("--yaw-only", arguments->options.yaw_only,
                     "restrict the alignment's rotation to the vertical axis");

@@ -56,8 +56,8 @@ Result<void> measure(const Arguments& arguments, std::string (RateMeter::*line)(
   Result<std::unique_ptr<TopicMonitor>> monitor =
       TopicMonitor::open(arguments.participant, arguments.topic, nanoseconds(arguments.wait_s));
   if (!monitor) return monitor.error();
-  const TypeSupport* const type = find_type((*monitor)->type());
-  const bool stamped = type && type->begins_with_stamp;
+  const MessageType* const type = find_type((*monitor)->type());
+  const bool stamped = type && begins_with_stamp(*type->info);
   if (line == &RateMeter::delay && !stamped) {
     return Error{ErrorCode::invalid_argument,
                  (*monitor)->type() + " does not begin with a stamp: its delay is unknown"};
@@ -91,7 +91,7 @@ Result<void> echo(const Arguments& arguments) {
   Result<std::unique_ptr<TopicMonitor>> monitor =
       TopicMonitor::open(arguments.participant, arguments.topic, nanoseconds(arguments.wait_s));
   if (!monitor) return monitor.error();
-  const TypeSupport* const type = find_type((*monitor)->type());
+  const MessageType* const type = find_type((*monitor)->type());
   if (!type) {
     return Error{ErrorCode::not_found,
                  "the type " + (*monitor)->type() +
@@ -100,10 +100,11 @@ Result<void> echo(const Arguments& arguments) {
   std::size_t seen = 0;
   std::size_t malformed = 0;
   std::string text;
+  const JsonOptions options;
   (*monitor)->run(arguments.duration_s > 0.0 ? std::optional(nanoseconds(arguments.duration_s)) : std::nullopt,
                   [&](const Sample& sample) {
                     text.clear();
-                    const DecodeStatus status = type->to_json(sample.bytes(), text);
+                    const DecodeStatus status = type->to_json(sample.bytes(), text, options);
                     if (status == DecodeStatus::ok) {
                       std::printf("%s\n", text.c_str());
                     } else {

@@ -27,6 +27,18 @@ Qos matching_qos(const std::vector<EndpointInfo>& writers) {
   return qos;
 }
 
+bool begins_with_stamp(const TypeInfo& type) {
+  std::string_view schema = type.schema;
+  while (!schema.empty()) {
+    const std::string_view line = schema.substr(0, schema.find('\n'));
+    schema.remove_prefix(std::min(schema.size(), line.size() + 1));
+    // Constants and comments may come first; the first field decides.
+    if (line.empty() || line.starts_with('#') || line.find('=') != std::string_view::npos) continue;
+    return line.starts_with("std_msgs/Header ") || line.starts_with("builtin_interfaces/Time ");
+  }
+  return false;
+}
+
 std::optional<Time> leading_stamp(Bytes cdr) {
   if (cdr.size() < 12) return std::nullopt;
   const bool little = cdr[1] == std::byte{1};

@@ -17,8 +17,11 @@ namespace adit {
 // The weakest request that still matches every one of these writers, and asks for history when all of them keep it.
 Qos matching_qos(const std::vector<EndpointInfo>& writers);
 
+// Whether messages of the type begin with a std_msgs/Header or a builtin_interfaces/Time, by its schema text.
+bool begins_with_stamp(const TypeInfo& type);
+
 // The header stamp of a serialized message: its first 8 bytes, seconds and nanoseconds, either endianness. Only
-// meaningful for types that begin with a std_msgs/Header or builtin_interfaces/Time.
+// meaningful where begins_with_stamp.
 std::optional<Time> leading_stamp(Bytes cdr);
 
 class TopicMonitor {

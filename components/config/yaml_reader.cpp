@@ -156,6 +156,11 @@ bool YamlSection::has(std::string_view key) const {
   return content_->find(key).IsDefined();
 }
 
+bool YamlSection::is_section(std::string_view key) const {
+  const YAML::Node found = content_->find(key);
+  return found.IsDefined() && found.IsMap();
+}
+
 std::vector<std::string> YamlSection::keys() const {
   std::vector<std::string> names;
   if (content_->node.IsDefined() && content_->node.IsMap()) {

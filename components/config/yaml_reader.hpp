@@ -29,6 +29,8 @@ struct YamlRange {
 class YamlSection {
  public:
   bool has(std::string_view key) const;
+  // The value under `key` is a mapping.
+  bool is_section(std::string_view key) const;
   // Keys in the order of the file.
   std::vector<std::string> keys() const;
 
