@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <mutex>
 
+#include "middleware/ros/ros_participant.hpp"
 #include "middleware/vendor.hpp"
 
 #ifdef ADIT_STATIC_VENDORS
@@ -146,9 +147,11 @@ Result<std::unique_ptr<Participant>> open(const ParticipantConfig& config) {
   }
   const auto vendor = load_vendor(resolved.vendor);
   if (!vendor) return vendor.error();
+  if (Result<void> valid = validate_ros_distro(resolved.ros_distro); !valid) return valid.error();
 
-  // The ROS layer (ros/) wraps here: it names the participant's USER_DATA and decorates what the vendor returns.
-  return (*vendor)->open(resolved, {});
+  Result<std::unique_ptr<Participant>> participant = (*vendor)->open(resolved, ros_participant_user_data(resolved));
+  if (!participant) return participant;
+  return make_ros_participant(*std::move(participant));
 }
 
 }  // namespace adit

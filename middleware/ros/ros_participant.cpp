@@ -240,7 +240,6 @@ std::string ros_participant_user_data(const ParticipantConfig& config) {
 
 Result<std::unique_ptr<Participant>> make_ros_participant(std::unique_ptr<Participant> inner) {
   const ParticipantConfig& config = inner->config();
-  if (Result<void> valid = validate_ros_distro(config.ros_distro); !valid) return valid.error();
   const GidForm form = config.ros_distro == "humble" ? GidForm::humble_24 : GidForm::iron_16;
   std::unique_ptr<NodeAnnouncer> announcer;
   if (config.ros_distro != "none") {
