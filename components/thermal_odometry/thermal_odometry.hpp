@@ -9,11 +9,11 @@
 #include <memory>
 #include <span>
 
-#include "components/thermal_odometry/depth_anchor.hpp"
 #include "components/thermal_odometry/estimate.hpp"
 #include "components/thermal_odometry/frame.hpp"
 #include "components/thermal_odometry/front_end.hpp"
-#include "components/thermal_odometry/selection.hpp"
+#include "components/thermal_odometry/initialiser.hpp"
+#include "components/thermal_odometry/mapper.hpp"
 #include "components/thermal_odometry/tracker.hpp"
 #include "idl/result.hpp"
 
@@ -28,17 +28,18 @@ struct Config {
   Mode mode = Mode::anchored;
   FrameGate::Config gate;
   FrontEnd::Config front_end;
-  PixelSelector::Config selection;
-  DepthAnchor::Config anchor;
   Tracker::Config tracker;
-  int min_points = 150;     // below: low_texture
-  int reference_views = 2;  // keyframes a frame is aligned to jointly
-  double min_keyframe_age_s = 0.3;
+  Mapper::Config mapper;
+  Initialiser::Config initialiser;
+  // When a frame becomes a keyframe: old enough, and flow, visibility or age say so. Few with LiDAR depth (every
+  // hand-over costs accuracy), more without (depth needs short baselines to match and long ones to be exact).
+  double anchored_keyframe_age_s = 0.3;
+  double mono_keyframe_age_s = 0.12;
   double max_keyframe_age_s = 1.0;
-  double keyframe_flow = 0.125;  // of the image width, median
-  double min_visible_share = 0.5;
-  double max_cloud_age_s = 0.15;
-  std::size_t max_cloud_points = 1U << 17U;
+  double anchored_keyframe_flow = 0.125;  // of the image width, median
+  double mono_keyframe_flow = 0.05;
+  double anchored_visible_share = 0.5;
+  double mono_visible_share = 0.6;
   double gap_s = 0.1;                 // longer since the last frame: start coarser, new keyframe
   int restart_after = 5;              // frames that could not be aligned
   bool prior_as_information = false;  // besides starting there: add the prior to the normal equations (paper R63)

@@ -10,43 +10,7 @@ namespace adit::thermal_odometry {
 namespace {
 
 constexpr int max_views = 8;
-const Pattern dx = Eigen::Map<const Pattern>(pattern_x.data());
-const Pattern dy = Eigen::Map<const Pattern>(pattern_y.data());
-
-float at_level(float pixel, int level) {
-  return (pixel + 0.5F) / static_cast<float>(1 << level) - 0.5F;
-}
-
 }  // namespace
-
-Eigen::Matrix<float, 2, 6> pixel_jacobian(float fx, float fy, float x, float y, float d) {
-  Eigen::Matrix<float, 2, 6> J;
-  J << fx * d, 0.0F, -fx * d * x, -fx * x * y, fx * (1.0F + x * x), -fx * y,  //
-      0.0F, fy * d, -fy * d * y, -fy * (1.0F + y * y), fy * x * y, fy * x;
-  return J;
-}
-
-// What carries a pixel of one host into the target image at one level.
-struct Tracker::Relative {
-  Eigen::Vector3f base;    // R K^-1 (0, 0, 1)
-  Eigen::Vector3f step_u;  // R K^-1 (1, 0, 0)
-  Eigen::Vector3f step_v;
-  Eigen::Vector3f t;
-  float gain;    // e^(a_j - a_i)
-  float offset;  // b_j - gain b_i
-
-  Relative() = default;
-  Relative(const CameraState& host, const CameraState& target, const Pinhole& camera) {
-    const Pose T = target.T_cw * host.T_cw.inverse();
-    const Eigen::Matrix3f R = T.rotation().cast<float>();
-    t = T.translation().cast<float>();
-    step_u = R.col(0) / static_cast<float>(camera.fx);
-    step_v = R.col(1) / static_cast<float>(camera.fy);
-    base = R.col(2) - step_u * static_cast<float>(camera.cx) - step_v * static_cast<float>(camera.cy);
-    gain = static_cast<float>(std::exp(target.a - host.a));
-    offset = static_cast<float>(target.b - std::exp(target.a - host.a) * host.b);
-  }
-};
 
 Tracker::Tracker(const Pinhole& camera, int levels, std::size_t capacity, const Config& config)
     : camera_(camera), levels_(levels), config_(config) {
@@ -66,23 +30,14 @@ void Tracker::set_reference(std::span<const ReferenceView> views, std::span<cons
     templates.resize(patches_.size());
     int& count = template_counts_[static_cast<std::size_t>(l)];
     count = 0;
-    const float c2 = config_.gradient_scale * config_.gradient_scale;
     for (std::size_t i = 0; i < patches_.size(); ++i) {
       const Patch& patch = patches_[i];
-      Template& entry = templates[i];
-      entry.weight.setZero();
+      templates[i].weight.setZero();
       const Pyramid* pyramid = views_[static_cast<std::size_t>(patch.host)].image;
-      const float u = at_level(patch.u, l);
-      const float v = at_level(patch.v, l);
-      const bool usable = pyramid != nullptr && samplable(pyramid->level(l), u - 2.0F, v - 2.0F) &&
-                          samplable(pyramid->level(l), u + 2.0F, v + 2.0F);
-      if (!usable) continue;
-      for (int k = 0; k < pattern_size; ++k) {
-        const Sample s = sample(pyramid->level(l), u + dx[k], v + dy[k]);
-        entry.intensity[k] = s.value;
-        entry.weight[k] = c2 / (c2 + s.gx * s.gx + s.gy * s.gy);
-      }
-      ++count;
+      if (pyramid == nullptr) continue;
+      const bool fits = take_template(pyramid->level(l), at_level(patch.u, l), at_level(patch.v, l),
+                                      config_.gradient_scale, templates[i]);
+      if (fits) ++count;
     }
   }
 }
@@ -92,18 +47,13 @@ Tracker::System Tracker::linearise(const Pyramid& pyramid, const CameraState& st
   System system;
   const Image& image = pyramid.level(level);
   const Pinhole camera = camera_.at_level(level);
-  const auto fx = static_cast<float>(camera.fx);
-  const auto fy = static_cast<float>(camera.fy);
-  const auto cx = static_cast<float>(camera.cx);
-  const auto cy = static_cast<float>(camera.cy);
-  std::array<Relative, max_views> relatives;
-  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Relative(views_[h].state, state, camera);
+  std::array<Warp, max_views> relatives;
+  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Warp(views_[h].state, state, camera);
   const auto& templates = templates_[static_cast<std::size_t>(level)];
   const float slope_scale = static_cast<float>(1 << level);
   const float inverse_sigma2 = 1.0F / (sigma * sigma);
   const float nu = config_.nu;
-  const float right = static_cast<float>(image.width) - 2.01F;
-  const float bottom = static_cast<float>(image.height) - 2.01F;
+  PatchView view;
 
   Matrix8f block = Matrix8f::Zero();
   Vector8f block_g = Vector8f::Zero();
@@ -122,42 +72,20 @@ Tracker::System Tracker::linearise(const Pyramid& pyramid, const CameraState& st
   };
 
   for (std::size_t i = 0; i < patches_.size(); ++i) {
-    const Template& entry = templates[i];
+    const PatchTemplate& entry = templates[i];
     if (entry.weight[0] == 0.0F) continue;
     const Patch& patch = patches_[i];
-    const Relative& relative = relatives[static_cast<std::size_t>(patch.host)];
-    const float u = at_level(patch.u, level);
-    const float v = at_level(patch.v, level);
-    const float d = patch.inverse_depth;
-    // X(k) = centre + du along_u + dv along_v: every pattern pixel on the patch's own plane.
-    const Eigen::Vector3f centre = relative.base + u * relative.step_u + v * relative.step_v + d * relative.t;
-    const Eigen::Vector3f along_u = relative.step_u + patch.slope_u * slope_scale * relative.t;
-    const Eigen::Vector3f along_v = relative.step_v + patch.slope_v * slope_scale * relative.t;
-    const Pattern z = centre.z() + dx * along_u.z() + dy * along_v.z();
-    if (!(z.minCoeff() > 0.05F)) continue;
-    const Pattern rho = z.inverse();
-    const Pattern px = fx * (centre.x() + dx * along_u.x() + dy * along_v.x()) * rho + cx;
-    const Pattern py = fy * (centre.y() + dx * along_u.y() + dy * along_v.y()) * rho + cy;
-    if (!(px.minCoeff() >= 1.0F && py.minCoeff() >= 1.0F && px.maxCoeff() < right && py.maxCoeff() < bottom)) continue;
-    Pattern r;
-    Pattern gx;
-    Pattern gy;
-    for (int k = 0; k < pattern_size; ++k) {
-      const Sample s = sample(image, px[k], py[k]);
-      r[k] = s.value;
-      gx[k] = s.gx;
-      gy[k] = s.gy;
-    }
-    r -= relative.gain * entry.intensity + relative.offset;
-
-    const float rho_c = 1.0F / centre.z();
-    const float x = centre.x() * rho_c;
-    const float y = centre.y() * rho_c;
-    const float d_target = d * rho_c;
+    const Warp& warp = relatives[static_cast<std::size_t>(patch.host)];
+    const bool visible =
+        view_patch(image, warp, at_level(patch.u, level), at_level(patch.v, level), patch.inverse_depth,
+                   patch.slope_u * slope_scale, patch.slope_v * slope_scale, view);
+    if (!visible) continue;
+    const Pattern r = view.value - (warp.gain * entry.intensity + warp.offset);
+    const Pattern& gx = view.gx;
+    const Pattern& gy = view.gy;
     // An uncertain depth weighs as much as the residual it may cause.
-    const float du_dd = fx * rho_c * (relative.t.x() - relative.t.z() * x);
-    const float dv_dd = fy * rho_c * (relative.t.y() - relative.t.z() * y);
-    const float j2 = (gx * du_dd + gy * dv_dd).square().mean();
+    const Eigen::Vector2f by_depth = view.by_depth(warp);
+    const float j2 = (gx * by_depth.x() + gy * by_depth.y()).square().mean();
     const float trust = 1.0F / (1.0F + j2 * patch.sigma * patch.sigma * inverse_sigma2);
     const Pattern normalised = r.square() * inverse_sigma2;
     const Pattern robust = entry.weight * (nu + 1.0F) / (nu + trust * normalised);
@@ -171,7 +99,7 @@ Tracker::System Tracker::linearise(const Pyramid& pyramid, const CameraState& st
       continue;
     }
     const Pattern w = robust * trust * inverse_sigma2;
-    const Pattern ja = -(relative.gain * entry.intensity + (relative.offset - static_cast<float>(state.b)));
+    const Pattern ja = -(warp.gain * entry.intensity + (warp.offset - static_cast<float>(state.b)));
     const Pattern wgx = w * gx;
     const Pattern wgy = w * gy;
     Eigen::Matrix2f G;
@@ -181,7 +109,8 @@ Tracker::System Tracker::linearise(const Pyramid& pyramid, const CameraState& st
     const Eigen::Vector2f gr((wgx * r).sum(), (wgy * r).sum());
     Eigen::Matrix2f affine;  // columns: with a, with b
     affine << (wgx * ja).sum(), -wgx.sum(), (wgy * ja).sum(), -wgy.sum();
-    const Eigen::Matrix<float, 2, 6> J = pixel_jacobian(fx, fy, x, y, d_target);
+    const Eigen::Matrix<float, 2, 6> J =
+        pixel_jacobian(warp.fx, warp.fy, view.x, view.y, patch.inverse_depth * view.rho);
     block.topLeftCorner<6, 6>().noalias() += J.transpose() * (G * J);
     block.topRightCorner<6, 2>().noalias() += J.transpose() * affine;
     block_g.head<6>().noalias() += J.transpose() * gr;
@@ -216,13 +145,13 @@ double Tracker::median_offset(const Pyramid& pyramid, const CameraState& state, 
   const Image& image = pyramid.level(level);
   const Pinhole camera = camera_.at_level(level);
   scratch_.clear();
-  std::array<Relative, max_views> relatives;
-  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Relative(views_[h].state, state, camera);
+  std::array<Warp, max_views> relatives;
+  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Warp(views_[h].state, state, camera);
   const auto& templates = templates_[static_cast<std::size_t>(level)];
   for (std::size_t i = 0; i < patches_.size(); ++i) {
     if (templates[i].weight[0] == 0.0F) continue;
     const Patch& patch = patches_[i];
-    const Relative& relative = relatives[static_cast<std::size_t>(patch.host)];
+    const Warp& relative = relatives[static_cast<std::size_t>(patch.host)];
     const Eigen::Vector3f X = relative.base + at_level(patch.u, level) * relative.step_u +
                               at_level(patch.v, level) * relative.step_v + patch.inverse_depth * relative.t;
     if (!(X.z() > 0.05F)) continue;
@@ -239,17 +168,17 @@ double Tracker::median_offset(const Pyramid& pyramid, const CameraState& state, 
 
 float Tracker::median_flow(const CameraState& state) const {
   scratch_.clear();
-  std::array<Relative, max_views> to_newest;
-  std::array<Relative, max_views> to_current;
+  std::array<Warp, max_views> to_newest;
+  std::array<Warp, max_views> to_current;
   const CameraState& newest = views_[static_cast<std::size_t>(newest_)].state;
   for (std::size_t h = 0; h < views_.size(); ++h) {
-    to_newest[h] = Relative(views_[h].state, newest, camera_);
-    to_current[h] = Relative(views_[h].state, state, camera_);
+    to_newest[h] = Warp(views_[h].state, newest, camera_);
+    to_current[h] = Warp(views_[h].state, state, camera_);
   }
   const auto fx = static_cast<float>(camera_.fx);
   const auto fy = static_cast<float>(camera_.fy);
   for (const Patch& patch : patches_) {
-    const auto project = [&](const Relative& relative) {
+    const auto project = [&](const Warp& relative) {
       return Eigen::Vector3f(relative.base + patch.u * relative.step_u + patch.v * relative.step_v +
                              patch.inverse_depth * relative.t);
     };
@@ -268,8 +197,8 @@ float Tracker::median_flow(const CameraState& state) const {
 float Tracker::correlation(const Pyramid& pyramid, const CameraState& state, int level) const {
   const Image& image = pyramid.level(level);
   const Pinhole camera = camera_.at_level(level);
-  std::array<Relative, max_views> relatives;
-  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Relative(views_[h].state, state, camera);
+  std::array<Warp, max_views> relatives;
+  for (std::size_t h = 0; h < views_.size(); ++h) relatives[h] = Warp(views_[h].state, state, camera);
   const auto& templates = templates_[static_cast<std::size_t>(level)];
   double n = 0.0;
   double sum_a = 0.0;
@@ -280,11 +209,12 @@ float Tracker::correlation(const Pyramid& pyramid, const CameraState& state, int
   for (std::size_t i = 0; i < patches_.size(); ++i) {
     if (templates[i].weight[0] == 0.0F) continue;
     const Patch& patch = patches_[i];
-    const Relative& relative = relatives[static_cast<std::size_t>(patch.host)];
+    const Warp& relative = relatives[static_cast<std::size_t>(patch.host)];
     const Eigen::Vector3f centre = relative.base + at_level(patch.u, level) * relative.step_u +
                                    at_level(patch.v, level) * relative.step_v + patch.inverse_depth * relative.t;
     for (int k = 0; k < pattern_size; ++k) {
-      const Eigen::Vector3f X = centre + dx[k] * relative.step_u + dy[k] * relative.step_v;
+      const Eigen::Vector3f X = centre + pattern_x[static_cast<std::size_t>(k)] * relative.step_u +
+                                pattern_y[static_cast<std::size_t>(k)] * relative.step_v;
       if (!(X.z() > 0.05F)) continue;
       const float px = static_cast<float>(camera.fx) * X.x() / X.z() + static_cast<float>(camera.cx);
       const float py = static_cast<float>(camera.fy) * X.y() / X.z() + static_cast<float>(camera.cy);

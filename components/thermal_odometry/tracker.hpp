@@ -1,9 +1,5 @@
 // Frame to keyframe: pose and affine brightness of a new image against patches of known inverse depth, coarse to fine
 // (paper R24, R27, R28; Engel et al., DSO, 2018, section 3.1, with the weights of Kerl et al., DVO, 2013).
-//
-// Poses are T_cw (camera <- world); increments multiply from the left: T <- exp(xi) T, xi = [translation, rotation].
-// Brightness of frame i: I_i - b_i = e^a_i L with the scene's radiance L, hence
-//   I_j = e^(a_j - a_i) (I_i - b_i) + b_j.
 #pragma once
 
 #include <array>
@@ -15,34 +11,15 @@
 #include "components/geometry/se3.hpp"
 #include "components/thermal_odometry/camera.hpp"
 #include "components/thermal_odometry/pyramid.hpp"
+#include "components/thermal_odometry/warp.hpp"
 
 namespace adit::thermal_odometry {
-
-struct CameraState {
-  Pose T_cw = Pose::Identity();
-  double a = 0.0;  // log gain
-  double b = 0.0;  // noise units
-};
 
 // A keyframe the tracker aligns to; the image outlives the reference.
 struct ReferenceView {
   CameraState state;
   const Pyramid* image = nullptr;
 };
-
-// A patch: pattern around a pixel of its host keyframe, on a plane in inverse depth.
-struct Patch {
-  float u = 0.0F;  // level 0
-  float v = 0.0F;
-  float inverse_depth = 0.0F;
-  float slope_u = 0.0F;
-  float slope_v = 0.0F;
-  float sigma = 0.0F;  // of inverse_depth
-  int host = 0;
-};
-
-// J = d(pixel)/d(left increment) of a point seen at normalised (x, y) with inverse depth d in the target image.
-Eigen::Matrix<float, 2, 6> pixel_jacobian(float fx, float fy, float x, float y, float d);
 
 struct TrackResult {
   CameraState state;
@@ -96,11 +73,6 @@ class Tracker {
  private:
   using Matrix8f = Eigen::Matrix<float, 8, 8>;
   using Vector8f = Eigen::Matrix<float, 8, 1>;
-  struct Template {
-    Pattern intensity;
-    Pattern weight;  // from the host gradient; 0 in the first entry: not on this level
-  };
-  struct Relative;
   struct System {
     Eigen::Matrix<double, 8, 8> H = Eigen::Matrix<double, 8, 8>::Zero();
     Eigen::Matrix<double, 8, 1> g = Eigen::Matrix<double, 8, 1>::Zero();
@@ -121,7 +93,7 @@ class Tracker {
   std::vector<ReferenceView> views_;
   int newest_ = 0;
   std::vector<Patch> patches_;
-  std::array<std::vector<Template>, Pyramid::max_levels> templates_;
+  std::array<std::vector<PatchTemplate>, Pyramid::max_levels> templates_;
   std::array<int, Pyramid::max_levels> template_counts_{};
   mutable std::vector<float> scratch_;
 };

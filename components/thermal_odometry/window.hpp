@@ -1,0 +1,143 @@
+// Windowed photometric bundle adjustment: poses and brightness of a few keyframes and one inverse depth a point, with
+// marginalisation and first-estimate Jacobians (Engel et al., DSO, 2018, sections 2.2-2.3; Leutenegger et al. 2015 for
+// the prior; Huang et al. 2009 for first estimates). LiDAR depth enters as a prior on a point (Shin and Kim 2019).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "components/thermal_odometry/warp.hpp"
+
+namespace adit::thermal_odometry {
+
+inline constexpr int max_keyframes = 7;
+inline constexpr int state_size = 8;  // pose increment, a, b
+
+struct Keyframe {
+  bool used = false;
+  bool in_prior = false;  // its linearisation point is frozen
+  std::int64_t id = 0;
+  std::int64_t stamp_ns = 0;
+  CameraState first;  // linearisation point
+  Eigen::Matrix<double, state_size, 1> delta = Eigen::Matrix<double, state_size, 1>::Zero();
+  CameraState state;  // exp(delta) first
+  Pyramid image;
+  int selected = 0;
+  int anchored = 0;
+};
+
+enum class Sight : std::uint8_t { untried, in, outlier, outside };
+
+struct WindowPoint {
+  Patch patch;  // host: slot of the keyframe
+  PatchTemplate look;
+  float prior_depth = 0.0F;
+  float prior_information = 0.0F;  // 0: no LiDAR
+  float hessian = 0.0F;            // information on the inverse depth from the pixels, of the last linearisation
+  std::array<Sight, max_keyframes> sight{};
+  int good = 0;  // targets it is seen in as an inlier
+  bool anchored() const { return prior_information > 0.0F; }
+};
+
+class Window {
+ public:
+  static constexpr int dimension = max_keyframes * state_size;
+  using Matrix = Eigen::Matrix<double, dimension, dimension>;
+  using Vector = Eigen::Matrix<double, dimension, 1>;
+
+  struct Config {
+    int iterations = 4;
+    float nu = 5.0F;
+    float gradient_scale = 20.0F;
+    float min_sigma = 0.3F;
+    float max_sigma = 8.0F;
+    float outlier = 16.0F;    // mean squared normalised residual of a patch
+    double gain_sigma = 0.3;  // weak: a and b stay bounded
+    double offset_sigma = 100.0;
+    double correlation = 10.0;      // photometric information counts this much too often
+    double marginal_weight = 0.25;  // of points that enter the prior (DSO: correlated residuals)
+    float min_hessian = 8.0F;       // times 1/d^2: relative depth information a marginalised point needs
+  };
+  Window(const Pinhole& camera, std::size_t capacity, const Config& config);
+
+  void clear();
+  // A free slot for the next keyframe, or -1: marginalise first.
+  int free_slot() const;
+  int newest() const { return newest_; }
+  int count() const;
+  Keyframe& keyframe(int slot) { return keyframes_[static_cast<std::size_t>(slot)]; }
+  const Keyframe& keyframe(int slot) const { return keyframes_[static_cast<std::size_t>(slot)]; }
+  std::span<WindowPoint> points() { return points_; }
+  std::span<const WindowPoint> points() const { return points_; }
+
+  // Swaps `image` into a free slot. The first keyframe's pose is held by the prior (it is the origin of the map).
+  int add_keyframe(std::int64_t stamp_ns, const CameraState& state, Pyramid& image);
+  // False if the window is full or the pattern leaves the host image.
+  bool add_point(const Patch& patch, float prior_information);
+
+  struct Stats {
+    float sigma = 0.0F;
+    int residuals = 0;
+    int points = 0;
+    bool ok = true;  // false: a step was not finite; the window must be given up
+  };
+  Stats optimise(int iterations);
+
+  // Moves points that no longer help and then the whole keyframe into the prior.
+  void marginalise(int slot);
+  // The keyframe DSO's distance score gives up, never one of the two newest.
+  int least_useful() const;
+  // Points whose host stays but which neither of the two newest keyframes sees: into the prior.
+  void retire_points();
+  // Everything `factor` times as large, about the newest keyframe's centre.
+  void rescale(double factor);
+
+  // The normal equations of the points for which `use` is set, all points if it is empty, around the current state with
+  // first-estimate geometry; depths eliminated. For tests and for marginalisation.
+  struct Normal {
+    Matrix H = Matrix::Zero();
+    Vector g = Vector::Zero();
+    double energy = 0.0;
+    double scale = 0.0;
+    int residuals = 0;
+  };
+  const Normal& linearise(bool only_marked, double depth_damping);
+  const Matrix& prior_H() const { return prior_H_; }
+  const Vector& prior_g() const { return prior_g_; }
+  // State vector: the deltas of all slots.
+  Vector delta() const;
+  void apply(const Vector& step);
+  float sigma() const { return sigma_; }
+
+ private:
+  struct PointSystem {
+    float H = 0.0F;
+    float g = 0.0F;
+    bool marked = false;
+  };
+  void update_state(Keyframe& keyframe);
+  void remove_marked();
+  void eliminate(int slot);
+
+  Pinhole camera_;
+  Config config_;
+  std::array<Keyframe, max_keyframes> keyframes_;
+  int newest_ = -1;
+  std::int64_t next_id_ = 0;
+  std::vector<WindowPoint> points_;
+  std::vector<PointSystem> systems_;
+  std::vector<Eigen::Matrix<float, dimension, 1>> couplings_;
+  Matrix prior_H_ = Matrix::Zero();
+  Vector prior_g_ = Vector::Zero();
+  Normal normal_;
+  float sigma_ = 1.5F;
+};
+
+// Schur complement: removes rows and columns [at, at + state_size) of H x = -g and leaves them zero.
+void eliminate_block(Window::Matrix& H, Window::Vector& g, int at);
+
+}  // namespace adit::thermal_odometry
