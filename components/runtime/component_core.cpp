@@ -351,6 +351,12 @@ Duration ComponentCore::busy_for() const {
   return since == 0 ? Duration::zero() : Duration(steady_ns() - since);
 }
 
+std::uint64_t ComponentCore::refused_messages() const {
+  std::uint64_t refused = 0;
+  for (const InputBase* input : inputs_) refused += input->refused_;
+  return refused;
+}
+
 ComponentStatus ComponentCore::status() const {
   ComponentStatus status;
   status.name = full_name_;

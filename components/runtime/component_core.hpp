@@ -55,6 +55,7 @@ class ComponentCore final : public Strand {
   LifecycleState state() const { return state_; }
   bool failed() const { return failed_; }
   ComponentStatus status() const;
+  std::uint64_t refused_messages() const;  // by all inputs: could not be decoded
   std::vector<PortInfo> ports() const;
   std::vector<ParamInfo> parameters() const;
   const std::string& type() const { return type_; }

@@ -46,3 +46,36 @@ function(adit_test name)
   endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_PREFIX "${name}." PROPERTIES ${properties})
 endfunction()
+
+# adit_component(TYPE SOURCES a.cpp ... [LINKS ...]): a component by the name ADIT_COMPONENT gives it. A module
+# libadit_component_TYPE.so that is loaded by name; with static libraries an object library that adit_link_components
+# puts into a program (its registration would be lost in an archive).
+function(adit_component type)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  if(BUILD_SHARED_LIBS)
+    add_library(adit_component_${type} MODULE ${ARG_SOURCES})
+  else()
+    add_library(adit_component_${type} OBJECT ${ARG_SOURCES})
+  endif()
+  target_link_libraries(adit_component_${type} PRIVATE adit_build adit_runtime ${ARG_LINKS})
+  set_target_properties(adit_component_${type} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  set_property(GLOBAL APPEND PROPERTY ADIT_COMPONENTS ${type})
+endfunction()
+
+# adit_link_components(TARGET [TYPE ...]): without types, all components defined so far. With shared libraries they are
+# built with the program and loaded when they are asked for; with static ones they are linked into it.
+function(adit_link_components target)
+  set(types ${ARGN})
+  if(NOT types)
+    get_property(types GLOBAL PROPERTY ADIT_COMPONENTS)
+  endif()
+  foreach(type IN LISTS types)
+    if(BUILD_SHARED_LIBS)
+      add_dependencies(${target} adit_component_${type})
+    else()
+      # An object library's objects and what they need; PRIVATE links do not come along by themselves.
+      target_link_libraries(${target} PRIVATE adit_component_${type}
+                            $<TARGET_PROPERTY:adit_component_${type},LINK_LIBRARIES>)
+    endif()
+  endforeach()
+endfunction()

@@ -1,0 +1,118 @@
+#include "components/runtime/timer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <mutex>
+#include <vector>
+
+#include "components/runtime/component.hpp"
+#include "components/runtime/testing/harness.hpp"
+
+namespace adit {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using testing::eventually;
+using testing::Harness;
+
+Time at(Duration time) {
+  return Time(time);
+}
+
+struct Ticking final : Component {
+  explicit Ticking(Duration period) : timer{*this, "tick", period, [this](const TimerTick& tick) { on_tick(tick); }} {}
+  void on_tick(const TimerTick& tick) {
+    const std::lock_guard lock(mutex);
+    scheduled.push_back(tick.scheduled.time_since_epoch());
+    missed.push_back(tick.missed);
+    if (nap > Duration::zero()) std::this_thread::sleep_for(std::exchange(nap, Duration::zero()));
+  }
+  void on_time_jump(Duration step) override { jumps.push_back(step); }
+  std::size_t ticks() {
+    const std::lock_guard lock(mutex);
+    return scheduled.size();
+  }
+  std::mutex mutex;
+  std::vector<Duration> scheduled;
+  std::vector<std::uint64_t> missed;
+  std::vector<Duration> jumps;
+  Duration nap{};
+  Timer timer;
+};
+
+TEST(Timer, FiresAtItsSimulatedTimes) {
+  Harness harness(0, nullptr, Clock::Source::simulated);
+  harness.clock.set(at(1s));
+  auto& ticking = harness.make<Ticking>("ticking", {}, 100ms);
+  harness.start();
+  for (Duration t : {1050ms, 1100ms, 1150ms, 1200ms}) {
+    harness.set_time(at(t));
+    harness.step();
+  }
+  EXPECT_THAT(ticking.scheduled, ElementsAre(1100ms, 1200ms));
+  EXPECT_THAT(ticking.missed, ElementsAre(0, 0));
+}
+
+TEST(Timer, CountsTicksThatWereMissedAndKeepsItsSchedule) {
+  Harness harness(0, nullptr, Clock::Source::simulated);
+  auto& ticking = harness.make<Ticking>("ticking", {}, 100ms);
+  harness.start();
+  for (Duration t : {350ms, 400ms}) {
+    harness.set_time(at(t));
+    harness.step();
+  }
+  EXPECT_THAT(ticking.scheduled, ElementsAre(300ms, 400ms));
+  EXPECT_THAT(ticking.missed, ElementsAre(2, 0));
+  EXPECT_EQ(ticking.timer.stats().missed, 2u);
+}
+
+TEST(Timer, AJumpBackIsReportedAndTheScheduleStartsOver) {
+  Harness harness(0, nullptr, Clock::Source::simulated);
+  harness.clock.set(at(10s));
+  auto& ticking = harness.make<Ticking>("ticking", {}, 100ms);
+  harness.start();
+  for (Duration t : {10100ms, 2000ms, 2050ms, 2100ms}) {
+    harness.set_time(at(t));
+    harness.step();
+  }
+  EXPECT_THAT(ticking.jumps, ElementsAre(-8100ms));
+  EXPECT_THAT(ticking.scheduled, ElementsAre(10100ms, 2100ms));
+}
+
+TEST(Timer, DoesNotDriftOnTheSystemClock) {
+  Harness harness(1);
+  auto& ticking = harness.make<Ticking>("ticking", {}, 5ms);
+  harness.start();
+  ASSERT_TRUE(eventually([&] { return ticking.ticks() >= 40; }));
+  const std::lock_guard lock(ticking.mutex);
+  std::uint64_t missed = 0;
+  for (const std::uint64_t n : ticking.missed) missed += n;
+  const Duration span = ticking.scheduled.back() - ticking.scheduled.front();
+  const Duration expected = 5ms * (ticking.scheduled.size() - 1 + missed - ticking.missed.front());
+  EXPECT_LT(std::chrono::abs(span - expected), 1ms);
+}
+
+TEST(Timer, ASlowHandlerMakesItMissTicksNotQueueThem) {
+  Harness harness(2);
+  auto& ticking = harness.make<Ticking>("ticking", {}, 10ms);
+  ticking.nap = 55ms;
+  harness.start();
+  ASSERT_TRUE(eventually([&] { return ticking.ticks() >= 3; }));
+  EXPECT_GE(ticking.timer.stats().missed, 4u);
+}
+
+TEST(Timer, StopsWithItsComponent) {
+  Harness harness(1);
+  auto& ticking = harness.make<Ticking>("ticking", {}, 1ms);
+  harness.start();
+  ASSERT_TRUE(eventually([&] { return ticking.ticks() > 2; }));
+  ASSERT_TRUE(ticking.core().deactivate());
+  const std::size_t ticks = ticking.ticks();
+  std::this_thread::sleep_for(20ms);
+  EXPECT_EQ(ticking.ticks(), ticks);
+}
+
+}  // namespace
+}  // namespace adit
