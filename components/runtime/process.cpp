@@ -100,6 +100,12 @@ std::vector<std::pair<std::string, std::vector<ParamInfo>>> Process::parameters(
 // --- Start
 // -------------------------------------------------------------------------------------------------------------
 
+Result<void> Process::open() {
+  auto participant = adit::open(parts_->config.middleware);
+  if (!participant) return participant.error();
+  return connect(std::move(*participant));
+}
+
 Result<void> Process::connect(std::unique_ptr<Participant> participant) {
   Parts& parts = *parts_;
   parts.participant = std::move(participant);

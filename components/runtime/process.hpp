@@ -46,7 +46,9 @@ class Process {
   std::vector<PortInfo> ports() const;
   std::vector<std::pair<std::string, std::vector<ParamInfo>>> parameters() const;  // by component
 
-  // Uses `participant`, which open(config.middleware) made; nullptr: only the local bus.
+  // Joins the domain of config.middleware and starts the threads.
+  Result<void> open();
+  // The same with a participant that exists already; nullptr: only the local bus.
   Result<void> connect(std::unique_ptr<Participant> participant);
   // Configures and activates each component in order, as far as its `start` says. On an error everything that was
   // started is stopped again.

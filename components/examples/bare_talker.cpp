@@ -1,0 +1,42 @@
+// Publishes std_msgs/String on /chatter ten times a second: adit_bare_talker [seconds] [domain].
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+
+#include "idl/codec.hpp"
+#include "middleware/participant.hpp"
+#include "std_msgs/msg/string.hpp"
+
+int main(int argc, char** argv) {
+  using namespace adit;
+  const double seconds = argc > 1 ? std::atof(argv[1]) : 10.0;
+  ParticipantConfig config;
+  config.name = "bare_talker";
+  if (argc > 2) config.domain = static_cast<std::uint32_t>(std::atoi(argv[2]));
+  auto participant = open(config);
+  if (!participant) {
+    std::fprintf(stderr, "%s\n", participant.error().message.c_str());
+    return 1;
+  }
+  EndpointConfig endpoint;
+  endpoint.topic = "/chatter";
+  endpoint.type = &type_info<std_msgs::msg::String>();
+  endpoint.qos = Qos::reliable(10);
+  endpoint.node = "/bare_talker";
+  auto writer = (*participant)->writer(endpoint);
+  if (!writer) {
+    std::fprintf(stderr, "%s\n", writer.error().message.c_str());
+    return 1;
+  }
+  std_msgs::msg::String message;
+  for (int i = 0; i < static_cast<int>(10 * seconds); ++i) {
+    message.data = "Hello World: " + std::to_string(i);
+    if (auto sent = (*writer)->publish(MessageEncoder(message)); !sent) {
+      std::fprintf(stderr, "%s\n", sent.error().message.c_str());
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  return 0;
+}
