@@ -54,6 +54,24 @@ Result<void> check(const Config& c) {
       {"genz.initial_threshold", c.genz.initial_threshold, 1e-3, 100.0},
       {"genz.min_motion", c.genz.min_motion, 0.0, 100.0},
       {"genz.max_iterations", static_cast<double>(c.genz.max_iterations), 1.0, 10000.0},
+      {"surfel.block_columns", static_cast<double>(c.surfel.block_columns), 0.0, 64.0},
+      {"surfel.block_rows", static_cast<double>(c.surfel.block_rows), 0.0, 64.0},
+      {"surfel.selection_cell", c.surfel.selection_cell, 0.02, 10.0},
+      {"surfel.range_sigma", c.surfel.range_sigma, 0.0, 1.0},
+      {"surfel.max_extent", c.surfel.max_extent, 0.05, 100.0},
+      {"surfel.min_width", c.surfel.min_width, 1e-4, 1.0},
+      {"surfel.planarity", c.surfel.planarity, 1e-3, 1.0},
+      {"surfel.max_thickness", c.surfel.max_thickness, 1e-3, 1.0},
+      {"surfel.cell_size", c.surfel.cell_size, 0.05, 10.0},
+      {"surfel.map_radius", c.surfel.map_radius, 5.0, 1000.0},
+      {"surfel.max_cells", static_cast<double>(c.surfel.max_cells), 1024.0, 1 << 24},
+      {"surfel.residual_sigma", c.surfel.residual_sigma, 1e-4, 1.0},
+      {"surfel.common_tilt", c.surfel.common_tilt, 0.0, 0.2},
+      {"surfel.required_translation", c.surfel.required_translation, 1e-4, 10.0},
+      {"surfel.required_rotation", c.surfel.required_rotation, 1e-5, 1.0},
+      {"surfel.max_acceleration", c.surfel.max_acceleration, 0.01, 1000.0},
+      {"surfel.max_angular_acceleration", c.surfel.max_angular_acceleration, 0.01, 1000.0},
+      {"surfel.deskew_share", c.surfel.deskew_share, 0.0, 1.0},
       {"genz.convergence", c.genz.convergence, 1e-12, 1.0},
   };
   for (const Range& range : ranges) {
@@ -63,7 +81,6 @@ Result<void> check(const Config& c) {
                        std::to_string(range.low) + ", " + std::to_string(range.high) + "]"};
     }
   }
-  if (c.mode == Mode::default_) return Error{ErrorCode::unavailable, "lidar odometry: mode default is not built yet"};
   if (to_string(c.mode) == "unknown") return Error{ErrorCode::invalid_argument, "lidar odometry: unknown mode"};
   return {};
 }

@@ -42,6 +42,25 @@ struct GenzConfig {
   double convergence = 1e-4;
 };
 
+// Mode default. The sizes suit indoor rooms to road tunnels; noise figures come from the sensor's data sheet.
+struct SurfelConfig {
+  std::size_t block_columns = 0, block_rows = 0;  // pixels of an image block; 0: from the image size
+  double selection_cell = 0.20;                   // one surfel in a cell of this size
+  double range_sigma = 0.02;                      // m, noise of a range
+  double max_extent = 1.5, min_width = 0.02;      // m, standard deviations along a surfel
+  double planarity = 0.15;                        // largest ratio of variances, thickness to width
+  double max_thickness = 0.0316;                  // m, standard deviation
+  double cell_size = 0.4;                         // of the local map
+  double map_radius = 80.0;
+  std::size_t max_cells = 1u << 16;
+  double residual_sigma = 0.015;                                    // m, expected for one surfel
+  double common_tilt = 0.00436;                                     // rad, that all normals may share
+  double required_translation = 0.03, required_rotation = 1.75e-3;  // sigma of an observable direction, m and rad
+  double max_acceleration = 3.0;  // m/s^2, of the vehicle: width of the constant-velocity prior. Larger is safe,
+  double max_angular_acceleration = 1.0;  // rad/s^2; smaller than the true one is not.
+  double deskew_share = 0.7;              // of the estimated motion in the compensation, at each association
+};
+
 struct Config {
   Mode mode = Mode::kiss;
   double min_range = 0.5;  // points outside ]min_range, max_range[ are dropped
@@ -58,6 +77,7 @@ struct Config {
 
   KissConfig kiss;
   GenzConfig genz;
+  SurfelConfig surfel;
 };
 
 // Error (invalid_argument) naming the first setting that is out of its range.

@@ -4,6 +4,7 @@
 
 #include "components/lidar_odometry/localizability.hpp"
 #include "components/lidar_odometry/point_odometry.hpp"
+#include "components/lidar_odometry/surfel_odometry.hpp"
 
 namespace adit::lidar_odometry {
 namespace {
@@ -22,6 +23,7 @@ bool usable(const Prior& prior) {
 }
 
 std::unique_ptr<Pipeline> make_pipeline(const Config& config, WorkerPool& pool) {
+  if (config.mode == Mode::default_) return std::make_unique<SurfelOdometry>(config, pool);
   return std::make_unique<PointOdometry>(config, pool);
 }
 
@@ -112,7 +114,10 @@ void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
         prior->kind == Prior::Kind::absolute ? odom_map.inverse() * prior->pose : map_sensor * prior->pose;
     if (coasting) task.twist = se3_log(map_sensor.inverse() * task.prediction) / task.dt;
   }
-  if (prior != nullptr && prior->twist) task.twist = *prior->twist;
+  if (prior != nullptr && prior->twist) {
+    task.twist = *prior->twist;
+    task.external_twist = true;
+  }
   task.prediction.linear() = orthonormalized(task.prediction.linear());
 
   pipeline->process(task, estimate);

@@ -1,8 +1,10 @@
 // Runs the odometry over the shared recordings and prints its figures; for studies, not a test.
 //   lidar_odometry_study synthetic kiss|genz|default raw|deskew [scans]
+//   lidar_odometry_study spread kiss|genz|default raw|deskew [seeds]
 //   lidar_odometry_study subt kiss|genz|default [max_range] [voxel]
 #include <cstdio>
 #include <cstdlib>
+#include <random>
 #include <string>
 
 #include "components/lidar_odometry/lidar_odometry.hpp"
@@ -46,12 +48,22 @@ int synthetic(Config config, bool deskew) {
     const double step = i > 0 ? (estimate[i - 1].inverse() * estimate[i]).translation().norm() : 0.0;
     const double truth = i > 0 ? (mid[i - 1].inverse() * mid[i]).translation().norm() : 0.0;
     const double other = i > 0 ? (published[i - 1].inverse() * published[i]).translation().norm() : 0.0;
+    const std::vector<Pose>& gt = config.mode == Mode::genz ? mid : end;
+    const Vector6d d =
+        i == 0 ? Vector6d::Zero().eval()
+               : se3_log((gt[i - 1].inverse() * gt[i]).inverse() * (estimate[i - 1].inverse() * estimate[i]));
+    const Vector6d total = se3_log((gt[0].inverse() * gt[i]).inverse() * (estimate[0].inverse() * estimate[i]));
     std::printf(
-        "%2zu %-12s step %.3f published %.3f truth %.3f  n %u matched %u solves %u cap %d rms %.3f alpha %.2f cells %u "
-        "weak %d s %.4f\n",
-        i, std::string(to_string(e.status)).c_str(), step, other, truth, e.scan.registered, e.scan.matched,
-        e.scan.solves, e.scan.iteration_cap, e.scan.rms_residual, e.scan.planar_ratio, e.scan.map_cells,
-        e.localizability.unobservable(), e.localizability.translation[0].sigma);
+        "%2zu %-12s step %.3f published %.3f truth %.3f err %6.3f %6.3f %6.3f m %6.3f %6.3f %6.3f deg total %6.3f %6.3f "
+        "%6.3f nees %.1f ",
+        i, std::string(to_string(e.status)).c_str(), step, other, truth, d[0], d[1], d[2], d[3] * 57.3, d[4] * 57.3,
+        d[5] * 57.3, total[0], total[1], total[2], d.dot(e.information * d));
+    std::printf("n %u matched %u assoc %u solves %u cap %d rms %.3f cells %u weak %d s", e.scan.registered,
+                e.scan.matched, e.scan.associations, e.scan.solves, e.scan.iteration_cap, e.scan.rms_residual,
+                e.scan.map_cells, e.localizability.unobservable());
+    for (const Direction& l : e.localizability.translation) std::printf(" %.4f", l.sigma);
+    for (const Direction& l : e.localizability.rotation) std::printf(" %.5f", l.sigma);
+    std::printf("\n");
     ++i;
   }
   print("ours vs mid", trajectory_error(mid, estimate));
@@ -59,6 +71,25 @@ int synthetic(Config config, bool deskew) {
   print("published vs mid", trajectory_error(mid, published));
   print("published vs end", trajectory_error(end, published));
   print("ours vs published", trajectory_error(published, estimate));
+  return 0;
+}
+
+// The same drive with 1 mm of noise added to every point, once for each seed: how far chance alone moves the figures.
+int spread(Config config, bool deskew, int seeds) {
+  const std::string folder = *shared_data("synthetic_lidar_64x512");
+  config.deskew = deskew;
+  const std::vector<Pose> truth = poses_of(folder + (config.mode == Mode::genz ? "/gt_mid.tum" : "/gt_end.tum"));
+  for (int seed = 0; seed < seeds; ++seed) {
+    std::mt19937 random(static_cast<unsigned>(seed));
+    std::uniform_real_distribution<float> noise(-0.001f, 0.001f);
+    LidarOdometry odometry(config);
+    std::vector<Pose> estimate;
+    for (RecordedSweep& sweep : read_sweeps(folder)) {
+      for (Point3f& point : sweep.points) point += Point3f(noise(random), noise(random), noise(random));
+      estimate.push_back(odometry.process(sweep.cloud()).pose);
+    }
+    print(("seed " + std::to_string(seed)).c_str(), trajectory_error(truth, estimate));
+  }
   return 0;
 }
 
@@ -94,11 +125,46 @@ int subt(const Config& config, double sigma_t, double sigma_r) {
 
 }  // namespace
 
+// Takes "name=value" arguments for the settings of mode default out of the command line.
+void take_settings(int& argc, char** argv, SurfelConfig& c) {
+  const std::pair<const char*, double*> settings[] = {{"selection_cell", &c.selection_cell},
+                                                      {"range_sigma", &c.range_sigma},
+                                                      {"max_extent", &c.max_extent},
+                                                      {"min_width", &c.min_width},
+                                                      {"planarity", &c.planarity},
+                                                      {"max_thickness", &c.max_thickness},
+                                                      {"cell_size", &c.cell_size},
+                                                      {"residual_sigma", &c.residual_sigma},
+                                                      {"common_tilt", &c.common_tilt},
+                                                      {"max_acceleration", &c.max_acceleration},
+                                                      {"max_angular_acceleration", &c.max_angular_acceleration},
+                                                      {"deskew_share", &c.deskew_share}};
+  int kept = 1;
+  for (int i = 1; i < argc; ++i) {
+    const std::string text = argv[i];
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos) {
+      argv[kept++] = argv[i];
+      continue;
+    }
+    const std::string name = text.substr(0, equals);
+    const double value = std::atof(text.c_str() + equals + 1);
+    if (name == "block_columns") c.block_columns = static_cast<std::size_t>(value);
+    if (name == "block_rows") c.block_rows = static_cast<std::size_t>(value);
+    for (const auto& [key, target] : settings) {
+      if (name == key) *target = value;
+    }
+  }
+  argc = kept;
+}
+
 int main(int argc, char** argv) {
-  const auto arg = [&](int i) { return std::string(argc > i ? argv[i] : ""); };
   Config config;
+  take_settings(argc, argv, config.surfel);
+  const auto arg = [&](int i) { return std::string(argc > i ? argv[i] : ""); };
   config.mode = mode_from_string(arg(2)).value_or(Mode::kiss);
   if (arg(1) == "synthetic") return synthetic(config, arg(3) != "raw");
+  if (arg(1) == "spread") return spread(config, arg(3) != "raw", argc > 4 ? std::atoi(argv[4]) : 10);
   if (arg(1) == "subt") {
     if (argc > 3) config.max_range = std::atof(argv[3]);
     if (argc > 4) config.kiss.voxel_size = config.genz.voxel_size = std::atof(argv[4]);

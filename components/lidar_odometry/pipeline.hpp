@@ -20,6 +20,7 @@ struct SweepTask {
   Vector6d twist = Vector6d::Zero();        // predicted, sensor frame
   Matrix6d information = Matrix6d::Zero();  // of the prediction, if it came from outside; right perturbation
   bool external = false;                    // the prediction came from outside
+  bool external_twist = false;              // the twist came from outside
 };
 
 // Fills status, pose, information, localizability and scan of the estimate; the pose in the local map's frame.

@@ -41,12 +41,16 @@ SweepMotion::SweepMotion(const Vector6d& twist, TimeSpan span, double reference_
   }
 }
 
-Eigen::Vector3d SweepMotion::compensate(const Eigen::Vector3d& point, double time) const {
-  if (!moving_) return point;
+SweepMotion::Affine SweepMotion::at(double time) const {
   const double position = std::clamp((time - first_) * inverse_step_, 0.0, static_cast<double>(intervals));
   const std::size_t i = std::min(static_cast<std::size_t>(position), static_cast<std::size_t>(intervals - 1));
   const double b = position - static_cast<double>(i);
-  const Affine pose = (1.0 - b) * poses_[i] + b * poses_[i + 1];
+  return (1.0 - b) * poses_[i] + b * poses_[i + 1];
+}
+
+Eigen::Vector3d SweepMotion::compensate(const Eigen::Vector3d& point, double time) const {
+  if (!moving_) return point;
+  const Affine pose = at(time);
   return pose.leftCols<3>() * point + pose.col(3);
 }
 

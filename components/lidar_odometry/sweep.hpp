@@ -37,11 +37,13 @@ class SweepMotion {
 
   // Coordinates at the reference time of a point measured at `time`. Outside the span: as at its nearer end.
   Eigen::Vector3d compensate(const Eigen::Vector3d& point, double time) const;
+  // The transform that does so, [R | t].
+  using Affine = Eigen::Matrix<double, 3, 4>;
+  Affine at(double time) const;
   bool moving() const { return moving_; }
 
  private:
   static constexpr int intervals = 128;
-  using Affine = Eigen::Matrix<double, 3, 4>;
   std::array<Affine, intervals + 1> poses_;
   double first_ = 0.0;
   double inverse_step_ = 0.0;

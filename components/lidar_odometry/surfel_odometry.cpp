@@ -1,0 +1,106 @@
+#include "components/lidar_odometry/surfel_odometry.hpp"
+
+#include <algorithm>
+
+namespace adit::lidar_odometry {
+namespace {
+
+constexpr int wide_gate_sweeps = 5;  // after the start: the map is thin and the velocity new
+constexpr double wide_gate = 0.5;    // m
+constexpr double gate = 0.2;         // m
+
+}  // namespace
+
+SurfelOdometry::SurfelOdometry(const Config& config, WorkerPool& pool)
+    : config_(config),
+      pool_(pool),
+      extractor_(config),
+      map_(config.surfel.cell_size, config.surfel.map_radius, config.surfel.max_cells),
+      registration_(config.surfel) {}
+
+void SurfelOdometry::reset() {
+  map_.clear();
+  sweeps_ = 0;
+  last_median_ = 0.0;
+}
+
+// Without a prior from outside: the velocity stays, within what the vehicle's acceleration can change in dt.
+SurfelPrior SurfelOdometry::prior_of(const SweepTask& task) const {
+  const double dt2 = std::clamp(task.dt * task.dt, 1e-6, 1.0);
+  const double translation = config_.surfel.max_acceleration * dt2;
+  const double rotation = config_.surfel.max_angular_acceleration * dt2;
+  Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(1.0 / (translation * translation)),
+      Eigen::Vector3d::Constant(1.0 / (rotation * rotation));
+  SurfelPrior prior;
+  prior.pose = task.prediction;
+  if (task.information.isZero(0.0)) {
+    prior.information = diagonal.asDiagonal();
+    return prior;
+  }
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = task.prediction.linear();
+  prior.information = turn * task.information * turn.transpose();
+  // A prior that leaves a direction open must not leave the solution open: 1 m, 0.2 rad.
+  prior.information.diagonal().head<3>().array() += 1.0;
+  prior.information.diagonal().tail<3>().array() += 25.0;
+  return prior;
+}
+
+SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
+  SweepTwist twist;
+  if (!config_.deskew || !task.times) return twist;
+  twist.times = task.times;
+  twist.reference_time = task.reference_time;
+  twist.last = task.last;
+  twist.predicted = task.twist;
+  twist.dt = task.dt <= config_.max_gap_s ? task.dt : 0.0;
+  twist.translation_share = task.external ? 0.0 : config_.surfel.deskew_share;
+  twist.rotation_share = task.external_twist ? 0.0 : config_.surfel.deskew_share;
+  return twist;
+}
+
+void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
+  estimate.pose = task.prediction;
+  const Cloud image = image_.organise(task.cloud);
+  extractor_.extract(image, pool_, surfels_, estimate.scan);
+  estimate.scan.registered = static_cast<std::uint32_t>(surfels_.size());
+  if (surfels_.size() < config_.min_points) {
+    estimate.status = Status::too_few_points;
+    return;
+  }
+  const SweepTwist twist = twist_of(task);
+  if (map_.empty()) {
+    estimate.status = Status::initialising;
+    registration_.place(surfels_, estimate.pose, twist);
+  } else {
+    const bool wide = sweeps_ < wide_gate_sweeps;
+    const std::size_t needed = std::max<std::size_t>(30, surfels_.size() / 10);
+    const SurfelRegistrationResult result =
+        registration_.align(surfels_, map_, task.prediction, prior_of(task), twist,
+                            wide ? wide_gate : std::max(gate, 12.0 * last_median_), needed, pool_);
+    estimate.scan.matched = static_cast<std::uint32_t>(result.matched);
+    estimate.scan.associations = static_cast<std::uint32_t>(result.associations);
+    estimate.scan.solves = static_cast<std::uint32_t>(result.solves);
+    estimate.scan.rms_residual = result.rms_residual;
+    estimate.scan.planar_ratio = 1.0;
+    if (result.matched < needed) {
+      estimate.status = Status::lost;
+      return;
+    }
+    last_median_ = result.median_residual;
+    estimate.pose = result.pose;
+    const Matrix6d information = DirectionalInformation::exported(result.directions);
+    Matrix6d turn = Matrix6d::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = result.pose.linear();
+    estimate.information = turn.transpose() * information * turn;
+    estimate.localizability = localizability(result.directions, result.pose.linear());
+    estimate.status = estimate.localizability.unobservable() > 0 ? Status::degenerate : Status::ok;
+  }
+  map_.add(registration_.placed(), estimate.pose.translation());
+  ++sweeps_;
+  estimate.scan.map_cells = static_cast<std::uint32_t>(map_.cells());
+  estimate.scan.evicted_cells = static_cast<std::uint32_t>(map_.evicted());
+}
+
+}  // namespace adit::lidar_odometry

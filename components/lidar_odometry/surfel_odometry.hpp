@@ -1,0 +1,38 @@
+// Mode default: range-image surfels against a map of averaged planes, with honest priors and directional information.
+#pragma once
+
+#include <vector>
+
+#include "components/lidar_odometry/config.hpp"
+#include "components/lidar_odometry/pipeline.hpp"
+#include "components/lidar_odometry/range_image.hpp"
+#include "components/lidar_odometry/surfel.hpp"
+#include "components/lidar_odometry/surfel_map.hpp"
+#include "components/lidar_odometry/surfel_registration.hpp"
+
+namespace adit::lidar_odometry {
+
+class SurfelOdometry final : public Pipeline {
+ public:
+  // Precondition: check(config) succeeds.
+  SurfelOdometry(const Config& config, WorkerPool& pool);
+
+  void process(const SweepTask& task, Estimate& estimate) override;
+  void reset() override;
+
+ private:
+  SurfelPrior prior_of(const SweepTask& task) const;
+  SweepTwist twist_of(const SweepTask& task) const;
+
+  Config config_;
+  WorkerPool& pool_;
+  RangeImage image_;
+  SurfelExtractor extractor_;
+  SurfelMap map_;
+  SurfelRegistration registration_;
+  std::vector<Surfel> surfels_;
+  int sweeps_ = 0;            // in the map
+  double last_median_ = 0.0;  // m, residual of the last registration
+};
+
+}  // namespace adit::lidar_odometry
