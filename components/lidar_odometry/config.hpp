@@ -62,7 +62,7 @@ struct SurfelConfig {
 };
 
 struct Config {
-  Mode mode = Mode::kiss;
+  Mode mode = Mode::default_;
   double min_range = 0.5;  // points outside ]min_range, max_range[ are dropped
   double max_range = 100.0;
   bool deskew = true;  // compensate the motion within the sweep if the cloud has point times

@@ -1,14 +1,18 @@
 // Runs the odometry over the shared recordings and prints its figures; for studies, not a test.
 //   lidar_odometry_study synthetic kiss|genz|default raw|deskew [scans]
 //   lidar_odometry_study spread kiss|genz|default raw|deskew [seeds]
-//   lidar_odometry_study subt kiss|genz|default [max_range] [voxel]
+//   lidar_odometry_study scene kiss|genz|default hall|smooth|furnished|portal SPEED SCANS [none|PRIOR_PERCENT] [rings
+//   columns] lidar_odometry_study subt kiss|genz|default [max_range] [voxel]
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <random>
 #include <string>
 
 #include "components/lidar_odometry/lidar_odometry.hpp"
-#include "components/lidar_odometry/test_data.hpp"
+#include "components/lidar_odometry/test_scene.hpp"
 
 using namespace adit;
 using namespace adit::lidar_odometry;
@@ -54,7 +58,8 @@ int synthetic(Config config, bool deskew) {
                : se3_log((gt[i - 1].inverse() * gt[i]).inverse() * (estimate[i - 1].inverse() * estimate[i]));
     const Vector6d total = se3_log((gt[0].inverse() * gt[i]).inverse() * (estimate[0].inverse() * estimate[i]));
     std::printf(
-        "%2zu %-12s step %.3f published %.3f truth %.3f err %6.3f %6.3f %6.3f m %6.3f %6.3f %6.3f deg total %6.3f %6.3f "
+        "%2zu %-12s step %.3f published %.3f truth %.3f err %6.3f %6.3f %6.3f m %6.3f %6.3f %6.3f deg total %6.3f "
+        "%6.3f "
         "%6.3f nees %.1f ",
         i, std::string(to_string(e.status)).c_str(), step, other, truth, d[0], d[1], d[2], d[3] * 57.3, d[4] * 57.3,
         d[5] * 57.3, total[0], total[1], total[2], d.dot(e.information * d));
@@ -90,6 +95,63 @@ int spread(Config config, bool deskew, int seeds) {
     }
     print(("seed " + std::to_string(seed)).c_str(), trajectory_error(truth, estimate));
   }
+  return 0;
+}
+
+// A drive along a generated scene: at rest for 10 sweeps, then with 3 m/s^2 to the speed. prior_percent: error of a
+// wheel-like prior; nan: none.
+int scene(Config config, const std::string& name, double speed, int scans, double prior_percent, ScannerModel model) {
+  const Scene world = name == "hall"        ? hall()
+                      : name == "smooth"    ? smooth_tunnel()
+                      : name == "furnished" ? furnished_tunnel()
+                                            : furnished_tunnel(-80.0, 40.0);
+  LidarOdometry odometry(config);
+  Pose pose = Pose::Identity();
+  std::vector<Pose> truth, estimate;
+  int flagged = 0;
+  double nees = 0.0, solves = 0.0, cpu = 0.0;
+  std::vector<double> times;
+  for (int k = 0; k < scans; ++k) {
+    Vector6d twist = Vector6d::Zero();
+    twist[0] = std::clamp(0.3 * (k - 9), 0.0, speed);
+    twist[5] = 0.0015 * twist[0] * std::sin(0.05 * k);
+    if (k > 0) pose = pose * se3_exp(model.period * twist);
+    truth.push_back(pose);
+    const RecordedSweep sweep = scan(world, model, pose, twist, k * 100'000'000LL, static_cast<unsigned>(k));
+    Prior prior;
+    Vector6d wheel = model.period * twist;
+    wheel[0] *= 1.0 + 0.01 * prior_percent;
+    prior.pose = se3_exp(wheel);
+    const double sigma = 0.015 * std::abs(wheel[0]) + 0.003;
+    prior.information.diagonal() << 1.0 / (sigma * sigma), 1e4, 1e4, 2.5e5, 2.5e5, 2.5e5;
+    const std::clock_t begin = std::clock();
+    const Estimate& e = odometry.process(sweep.cloud(), std::isnan(prior_percent) ? nullptr : &prior);
+    times.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+    cpu += times.back();
+    estimate.push_back(e.pose);
+    if (k == 0) continue;
+    const bool weak = !e.localizability.translation[0].observable;
+    flagged += weak ? 1 : 0;
+    const Vector6d d = se3_log((truth[truth.size() - 2].inverse() * pose).inverse() *
+                               (estimate[estimate.size() - 2].inverse() * e.pose));
+    nees += d.dot(e.information * d);
+    solves += e.scan.solves;
+    const Vector6d total = se3_log(pose.inverse() * e.pose);
+    if (k % std::max(1, scans / 20) == 0 || e.status == Status::lost) {
+      std::printf(
+          "%3d %-10s x %.2f total %6.3f %6.3f %6.3f m %5.2f %5.2f %5.2f deg axis %.3f %.3f sigma %.4f  n %u matched %u "
+          "solves %u cells %u\n",
+          k, std::string(to_string(e.status)).c_str(), pose.translation().x(), total[0], total[1], total[2],
+          total[3] * 57.3, total[4] * 57.3, total[5] * 57.3, e.localizability.translation[0].axis.x(),
+          e.localizability.translation[0].axis.y(), e.localizability.translation[0].sigma, e.scan.registered,
+          e.scan.matched, e.scan.solves, e.scan.map_cells);
+    }
+  }
+  print("ours vs truth", trajectory_error(truth, estimate));
+  std::sort(times.begin(), times.end());
+  std::printf("flagged %.1f %%  nees %.2f  solves %.1f  ms mean %.1f median %.1f p95 %.1f max %.1f\n",
+              100.0 * flagged / (scans - 1), nees / (scans - 1), solves / (scans - 1), cpu / scans,
+              times[times.size() / 2], times[times.size() * 95 / 100], times.back());
   return 0;
 }
 
@@ -165,6 +227,13 @@ int main(int argc, char** argv) {
   config.mode = mode_from_string(arg(2)).value_or(Mode::kiss);
   if (arg(1) == "synthetic") return synthetic(config, arg(3) != "raw");
   if (arg(1) == "spread") return spread(config, arg(3) != "raw", argc > 4 ? std::atoi(argv[4]) : 10);
+  if (arg(1) == "scene") {
+    ScannerModel model;
+    model.rings = argc > 7 ? std::atoi(argv[7]) : 64;
+    model.columns = argc > 8 ? std::atoi(argv[8]) : 512;
+    return scene(config, arg(3), std::atof(arg(4).c_str()), std::atoi(arg(5).c_str()),
+                 arg(6).empty() || arg(6) == "none" ? std::nan("") : std::atof(arg(6).c_str()), model);
+  }
   if (arg(1) == "subt") {
     if (argc > 3) config.max_range = std::atof(argv[3]);
     if (argc > 4) config.kiss.voxel_size = config.genz.voxel_size = std::atof(argv[4]);

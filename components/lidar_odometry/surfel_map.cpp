@@ -6,9 +6,10 @@
 namespace adit::lidar_odometry {
 namespace {
 
-constexpr float min_count = 3.0f;
-constexpr float max_count = 100.0f;     // then older surfels fade
-constexpr float min_alignment = 0.98f;  // |sum n| / count: else the cell holds an edge
+constexpr float min_count = 1.0f;
+constexpr float usual_variance = 1e-4f;  // m^2
+constexpr float max_count = 100.0f;      // then older surfels fade
+constexpr float min_alignment = 0.98f;   // |sum n| / count: else the cell holds an edge
 constexpr std::size_t sweep_parts = 32;
 constexpr std::size_t eviction_candidates = 64;
 
@@ -125,7 +126,9 @@ void SurfelMap::update_plane(Index index) {
   const float along = n.dot(plane.mean);
   const float square = n.x() * (n.x() * m.squares[0] + 2.0f * n.y() * m.squares[1] + 2.0f * n.z() * m.squares[2]) +
                        n.y() * (n.y() * m.squares[3] + 2.0f * n.z() * m.squares[4]) + n.z() * n.z() * m.squares[5];
-  plane.variance = std::max(square / m.count - along * along, 0.0f) / m.count;
+  // The spread about the plane, from so few samples with two more of a usual one.
+  const float spread = (std::max(square - m.count * along * along, 0.0f) + 2.0f * usual_variance) / (m.count + 2.0f);
+  plane.variance = spread / m.count;
 }
 
 }  // namespace adit::lidar_odometry

@@ -57,13 +57,17 @@ Scene hall() {
 Scene smooth_tunnel() {
   Scene scene;
   scene.tunnel_radius = 4.0;
+  scene.solids = {{{-1e4, -5.0, -5.0}, {1e4, 5.0, -1.6}},
+                  {{-1e4, -5.0, -1.6}, {1e4, -2.9, -1.35}},
+                  {{-1e4, 2.9, -1.6}, {1e4, 5.0, -1.35}}};
   return scene;
 }
 
-Scene furnished_tunnel() {
+Scene furnished_tunnel(double first, double last) {
   Scene scene = smooth_tunnel();
-  for (int i = -20; i <= 60; ++i) {
+  for (int i = -60; i <= 400; ++i) {
     const double x = 3.1 * i + 0.7 * std::sin(5.0 * i);
+    if (x < first || x > last) continue;
     const double side = i % 2 == 0 ? 1.0 : -1.0;
     const double low = -1.0 + 0.5 * std::sin(3.0 * i);
     const Eigen::Vector3d a(x, 3.3 * side, low);

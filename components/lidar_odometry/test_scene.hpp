@@ -24,10 +24,10 @@ struct Scene {
 
 // A furnished hall of 24 x 16 x 7 m around the origin: everything is observable.
 Scene hall();
-// A smooth tunnel of 4 m radius along x: the position along it is not observable.
+// A smooth tunnel of 4 m radius along x with floor and kerbs: only the position along it is not observable.
 Scene smooth_tunnel();
-// The same with boxes on the walls every few metres: observable.
-Scene furnished_tunnel();
+// The same with boxes on the walls every few metres from x = first to x = last: observable there.
+Scene furnished_tunnel(double first = -80.0, double last = 400.0);
 
 struct ScannerModel {
   int rings = 32;
