@@ -1,0 +1,18 @@
+#include "components/tunnel_simulator/parallel.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+namespace adit::tunnel_simulator {
+
+void parallel_for(int threads, std::size_t count, const std::function<void(std::size_t)>& body) {
+  if (threads <= 1 || count <= 1) {
+    for (std::size_t i = 0; i < count; ++i) body(i);
+    return;
+  }
+  tbb::task_arena arena(threads);
+  arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body); });
+}
+
+}  // namespace adit::tunnel_simulator
