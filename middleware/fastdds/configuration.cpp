@@ -28,7 +28,10 @@ using eprosima::fastrtps::rtps::IPLocator;
 
 // Participants of a host are looked for at the ports of this many participant ids (the vendor's default: 4).
 constexpr std::uint32_t participants_per_host = 120;
-constexpr std::uint32_t loopback_message_bytes = 65000;
+// The vendor drops datagrams larger than what it may send itself, so UDP always allows the largest (Cyclone DDS sends
+// up to 65500); what we send is limited by the other transport's maximum, for the vendor fragments by the smallest of
+// all.
+constexpr std::uint32_t largest_message_bytes = 65500;
 constexpr std::uint32_t ethernet_message_bytes = 1472;  // fits an MTU of 1500 without IP fragmentation
 constexpr std::uint32_t smallest_segment = 32 << 20;
 constexpr std::uint32_t port_queue_capacity = 4096;
@@ -70,12 +73,24 @@ Result<std::string> resolve(const std::string& peer) {
   return std::string(text);
 }
 
-rtps::Locator_t locator(const std::string& address) {
+rtps::Locator_t locator(const std::string& address, std::uint32_t port) {
   rtps::Locator_t result;
   result.kind = LOCATOR_KIND_UDPv4;
-  result.port = 0;  // the vendor fills in the ports of the domain
+  result.port = port;
   IPLocator::setIPv4(result, address);
   return result;
+}
+
+// The ports where a host's participants listen for discovery, last id first. The order matters: the vendor opens its
+// ears only after the first round of announcements, and who is asked early (usually there are few participants, with
+// low ids) would answer to deaf ears and then wait for the next period.
+void look_for_participants(const std::string& address, std::uint32_t domain, const rtps::PortParameters& ports,
+                           rtps::LocatorList_t& peers) {
+  const std::uint32_t first = ports.portBase + ports.domainIDGain * domain + ports.offsetd1;
+  const std::uint32_t fitting = (65535 - first) / ports.participantIDGain;
+  for (std::uint32_t id = std::min(participants_per_host, fitting); id-- > 0;) {
+    peers.push_back(locator(address, first + ports.participantIDGain * id));
+  }
 }
 
 // What the kernel really grants to a socket that asks for `wanted` bytes.
@@ -186,18 +201,20 @@ Result<Configuration> configure(const ParticipantConfig& config, std::string_vie
   qos.entity_factory().autoenable_created_entities = true;
 
   // Transports.
-  const auto message_bytes = result.loopback ? loopback_message_bytes : ethernet_message_bytes;
+  const auto message_bytes = result.loopback || !config.shared_memory ? largest_message_bytes : ethernet_message_bytes;
   const auto buffer =
-      static_cast<std::uint32_t>(std::clamp<std::size_t>(config.socket_buffer_bytes, loopback_message_bytes, 1u << 30));
+      static_cast<std::uint32_t>(std::clamp<std::size_t>(config.socket_buffer_bytes, largest_message_bytes, 1u << 30));
   auto udp = std::make_shared<UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {*address};
-  udp->maxMessageSize = message_bytes;
-  udp->maxInitialPeersRange = participants_per_host;
+  udp->maxMessageSize = largest_message_bytes;
   udp->sendBufferSize = udp->receiveBufferSize = buffer;
   auto& transport = qos.transport();
   transport.use_builtin_transports = false;
   transport.send_socket_buffer_size = transport.listen_socket_buffer_size = buffer;
   text += "UDP message: at most " + std::to_string(message_bytes) + " bytes\n";
+  if (!result.loopback && message_bytes > ethernet_message_bytes) {
+    text += "note: without shared memory messages are cut into datagrams by the kernel (IP fragmentation)\n";
+  }
   text += buffer_line("UDP receive buffer", "net.core.rmem_max", buffer, granted_buffer(SO_RCVBUF, buffer));
   text += buffer_line("UDP send buffer", "net.core.wmem_max", buffer, granted_buffer(SO_SNDBUF, buffer));
   if (config.shared_memory) {
@@ -206,6 +223,7 @@ Result<Configuration> configure(const ParticipantConfig& config, std::string_vie
     if (const auto obstacle = shared_memory_obstacle(segment); obstacle.empty()) {
       auto memory = std::make_shared<SharedMemTransportDescriptor>();
       memory->segment_size(segment);
+      memory->max_message_size(message_bytes);
       memory->port_queue_capacity(port_queue_capacity);
       transport.user_transports.push_back(memory);
       text += "shared memory: segment of " + std::to_string(segment) + " bytes, " +
@@ -221,8 +239,9 @@ Result<Configuration> configure(const ParticipantConfig& config, std::string_vie
   // Discovery: unicast to the host itself and the static peers; the ports of all participant ids are tried.
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = {10, 0};
-  builtin.discovery_config.leaseDuration_announcementperiod = {2, 0};
-  builtin.initialPeersList.push_back(locator(*address));
+  builtin.discovery_config.leaseDuration_announcementperiod = {1, 0};
+  const auto& ports = qos.wire_protocol().port;
+  look_for_participants(*address, config.domain, ports, builtin.initialPeersList);
   text += "discovery: unicast to " + *address;
   for (const auto& peer : config.peers) {
     const auto resolved = resolve(peer);
@@ -233,20 +252,17 @@ Result<Configuration> configure(const ParticipantConfig& config, std::string_vie
                                                     "that leads to it (network: eth0)"};
     }
     if (*resolved == *address) continue;
-    builtin.initialPeersList.push_back(locator(*resolved));
+    look_for_participants(*resolved, config.domain, ports, builtin.initialPeersList);
     text += ", " + *resolved;
   }
   text += ", participant ids 0 to " + std::to_string(participants_per_host - 1);
   if (config.multicast && !result.loopback) {
-    // The vendor's default locators include the domain's multicast group; as an initial peer it must be named.
-    auto group = locator("239.255.0.1");
-    const auto& port = qos.wire_protocol().port;
-    group.port = port.getMulticastPort(config.domain);
+    const auto group = locator("239.255.0.1", ports.getMulticastPort(config.domain));
     builtin.initialPeersList.push_back(group);
     builtin.metatrafficMulticastLocatorList.push_back(group);
     text += ", multicast 239.255.0.1";
   }
-  builtin.metatrafficUnicastLocatorList.push_back(locator(*address));
+  builtin.metatrafficUnicastLocatorList.push_back(locator(*address, 0));  // the port of our participant id
   text += "\n";
 
   if (config.security) {

@@ -6,11 +6,6 @@
 namespace adit::fastdds {
 namespace {
 
-// Plain CDR of either endianness; what else a foreign writer may send (parameter lists, XCDR2) nobody here can decode.
-bool is_plain_cdr(Bytes sample) {
-  return sample.size() >= 4 && sample[0] == std::byte{0} && sample[1] <= std::byte{1};
-}
-
 std::uint64_t sequence_of(const dds::SampleInfo& info) {
   return info.sample_identity.sequence_number().to64long();
 }

@@ -7,6 +7,11 @@
 
 namespace adit::fastdds {
 
+// Plain CDR of either endianness; what else a foreign writer may send (parameter lists, XCDR2) nobody here can decode.
+inline bool is_plain_cdr(Bytes sample) {
+  return sample.size() >= 4 && sample[0] == std::byte{0} && sample[1] <= std::byte{1};
+}
+
 // What deserialize() leaves in a loaned sample: where the payload is. Valid while the loan lasts.
 struct PayloadView {
   const std::byte* data = nullptr;

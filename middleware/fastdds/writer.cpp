@@ -5,6 +5,8 @@
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 
+#include "middleware/fastdds/serialized_type.hpp"
+
 namespace adit::fastdds {
 namespace {
 
@@ -92,6 +94,10 @@ Result<void> FastWriter::publish(const Encoder& message, Time source_time) {
 }
 
 Result<void> FastWriter::forward(Bytes cdr, Time source_time) {
+  if (!is_plain_cdr(cdr)) {
+    failed_.fetch_add(1, std::memory_order_relaxed);
+    return Error{ErrorCode::malformed, "'" + config_.topic + "': forward() takes plain CDR with its 4-byte header"};
+  }
   return publish(CopyingEncoder(cdr), source_time);
 }
 
