@@ -113,8 +113,11 @@ dds::DataWriterQos writer_qos(const EndpointConfig& config, bool synchronous) {
               keep_all ? keep_all_limit(*config.type) : config.qos.depth);
   qos.reliability().max_blocking_time = to_vendor(config.qos.max_blocking);
   qos.publish_mode().kind = synchronous ? dds::SYNCHRONOUS_PUBLISH_MODE : dds::ASYNCHRONOUS_PUBLISH_MODE;
-  // The default of 3 s is how long a reader stalls after the last sample of a burst was lost.
-  qos.reliable_writer_qos().times.heartbeatPeriod = milliseconds(100);
+  // The default period of 3 s is how long a reader stalls after the last sample of a burst was lost. None is sent along
+  // with data: a volatile Cyclone DDS reader takes the first heartbeat it sees as the end of what is not for it, which
+  // in the middle of a fragmented sample would cost it that sample.
+  qos.reliable_writer_qos().times.heartbeatPeriod = milliseconds(20);
+  qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
   return qos;
 }
 

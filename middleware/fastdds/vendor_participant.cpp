@@ -153,7 +153,7 @@ std::string VendorParticipant::explain() const {
          to_string(gid_) + "\n" + configuration_.explanation +
          "data-sharing: off; same process: by reference; writers: " +
          (configuration_.loopback ? "synchronous" : "synchronous, those of large messages asynchronous") +
-         ", heartbeat 100 ms\n";
+         ", heartbeat 20 ms\n";
 }
 
 void VendorParticipant::on_participant_discovery(dds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& discovered) {
