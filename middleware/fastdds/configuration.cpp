@@ -33,7 +33,7 @@ constexpr std::uint32_t participants_per_host = 120;
 // all.
 constexpr std::uint32_t largest_message_bytes = 65500;
 constexpr std::uint32_t ethernet_message_bytes = 1472;  // fits an MTU of 1500 without IP fragmentation
-constexpr std::uint32_t smallest_segment = 32 << 20;
+constexpr std::uint32_t smallest_segment = 1 << 20;
 constexpr std::uint32_t port_queue_capacity = 4096;
 
 bool is_loopback(std::string_view address) {
@@ -81,14 +81,12 @@ rtps::Locator_t locator(const std::string& address, std::uint32_t port) {
   return result;
 }
 
-// The ports where a host's participants listen for discovery, last id first. The order matters: the vendor opens its
-// ears only after the first round of announcements, and who is asked early (usually there are few participants, with
-// low ids) would answer to deaf ears and then wait for the next period.
+// The ports where a host's participants listen for discovery.
 void look_for_participants(const std::string& address, std::uint32_t domain, const rtps::PortParameters& ports,
                            rtps::LocatorList_t& peers) {
   const std::uint32_t first = ports.portBase + ports.domainIDGain * domain + ports.offsetd1;
   const std::uint32_t fitting = (65535 - first) / ports.participantIDGain;
-  for (std::uint32_t id = std::min(participants_per_host, fitting); id-- > 0;) {
+  for (std::uint32_t id = 0; id < std::min(participants_per_host, fitting); ++id) {
     peers.push_back(locator(address, first + ports.participantIDGain * id));
   }
 }
@@ -234,12 +232,14 @@ Result<Configuration> configure(const ParticipantConfig& config, std::string_vie
   } else {
     text += "shared memory: switched off\n";
   }
-  transport.user_transports.push_back(udp);
+  result.audible = std::make_shared<std::atomic<bool>>(false);
+  transport.user_transports.push_back(std::make_shared<LateAnnouncement>(udp, result.audible));
 
   // Discovery: unicast to the host itself and the static peers; the ports of all participant ids are tried.
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = {10, 0};
   builtin.discovery_config.leaseDuration_announcementperiod = {1, 0};
+  builtin.discovery_config.initial_announcements = {5, {0, 10'000'000}};
   const auto& ports = qos.wire_protocol().port;
   look_for_participants(*address, config.domain, ports, builtin.initialPeersList);
   text += "discovery: unicast to " + *address;

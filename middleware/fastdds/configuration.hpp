@@ -4,11 +4,13 @@
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 
 #include "middleware/config.hpp"
+#include "middleware/fastdds/late_announcement.hpp"
 
 namespace adit::fastdds {
 
 struct Configuration {
   eprosima::fastdds::dds::DomainParticipantQos qos;
+  LateAnnouncement::Audible audible;  // to set when the participant is created
   bool loopback = true;
   std::string explanation;  // one "name: value" line each, warnings included
 };

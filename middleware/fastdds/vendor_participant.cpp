@@ -79,6 +79,7 @@ Result<std::shared_ptr<VendorParticipant>> VendorParticipant::open(const Partici
                                              "its own message is on stderr. Configuration:\n" +
                                              result->configuration_.explanation};
   }
+  *result->configuration_.audible = true;
   result->gid_ = self.gid = to_gid(result->participant_->guid());
   result->discovery_.add(self);
 
