@@ -1,0 +1,100 @@
+#include "components/state_estimator/correction.hpp"
+
+#include <Eigen/Cholesky>
+
+#include "components/geometry/se3.hpp"
+
+namespace adit::state_estimator {
+namespace {
+
+template <int Rows>
+struct Terms {
+  Eigen::Matrix<double, Rows, kStates> h;
+  Eigen::Matrix<double, kStates, Rows> pht;
+  Eigen::Matrix<double, Rows, 1> nu;
+  Eigen::Matrix<double, Rows, Rows> r, s;
+  Eigen::LLT<Eigen::Matrix<double, Rows, Rows>> cholesky;
+
+  Terms(const FilterState& state, const Innovation& innovation)
+      : h(innovation.jacobian.topRows<Rows>()),
+        nu(innovation.value.head<Rows>()),
+        r(innovation.covariance.topLeftCorner<Rows, Rows>()) {
+    pht.noalias() = state.p * h.transpose();
+    s.noalias() = h * pht;
+    s += r;
+    cholesky.compute(s);
+  }
+};
+
+template <int Rows>
+double distance(const FilterState& state, const Innovation& innovation) {
+  const Terms<Rows> t(state, innovation);
+  return t.cholesky.info() == Eigen::Success ? t.nu.dot(t.cholesky.solve(t.nu)) : -1.0;
+}
+
+template <int Rows>
+bool correct_rows(FilterState& state, const Innovation& innovation) {
+  const Terms<Rows> t(state, innovation);
+  if (t.cholesky.info() != Eigen::Success) return false;
+  const Eigen::Matrix<double, kStates, Rows> k = t.cholesky.solve(t.pht.transpose()).transpose();
+  const StateVector x = state.x + k * t.nu;
+  // (I - K H) P, then times (I - K H)' plus K R K', each as a low-rank change.
+  StateMatrix p = state.p;
+  p.noalias() -= k * t.pht.transpose();
+  const Eigen::Matrix<double, kStates, Rows> rest = k * t.r - p * t.h.transpose();
+  p.noalias() += rest * k.transpose();
+  if (!x.allFinite() || !p.allFinite()) return false;
+  state.x = x;
+  state.p = 0.5 * (p + p.transpose());
+  state.x(kYaw) = wrap_angle(state.x(kYaw));
+  for (int slot = 0; slot < kCloneSlots; ++slot) {
+    double& angle = state.x(clone_index(slot) + 2);
+    angle = wrap_angle(angle);
+  }
+  return true;
+}
+
+}  // namespace
+
+double chi_square(int dof, Quantile quantile) {
+  constexpr double table[3][4] = {
+      {3.8415, 6.6349, 10.8276, 15.1367}, {5.9915, 9.2103, 13.8155, 18.4207}, {7.8147, 11.3449, 16.2662, 21.1075}};
+  return table[dof < 1 ? 0 : dof > 3 ? 2 : dof - 1][static_cast<int>(quantile)];
+}
+
+Innovation project(const Linearization& linearization, const Measurement& measurement) {
+  Innovation innovation;
+  innovation.rows = measurement.rows;
+  innovation.value = measurement.projection * linearization.innovation;
+  innovation.jacobian = measurement.projection * linearization.jacobian;
+  innovation.covariance = measurement.covariance;
+  return innovation;
+}
+
+double squared_distance(const FilterState& state, const Innovation& innovation) {
+  switch (innovation.rows) {
+    case 1:
+      return distance<1>(state, innovation);
+    case 2:
+      return distance<2>(state, innovation);
+    case 3:
+      return distance<3>(state, innovation);
+    default:
+      return -1.0;
+  }
+}
+
+bool correct(FilterState& state, const Innovation& innovation) {
+  switch (innovation.rows) {
+    case 1:
+      return correct_rows<1>(state, innovation);
+    case 2:
+      return correct_rows<2>(state, innovation);
+    case 3:
+      return correct_rows<3>(state, innovation);
+    default:
+      return false;
+  }
+}
+
+}  // namespace adit::state_estimator

@@ -1,0 +1,33 @@
+// The Kalman correction and its gate.
+#pragma once
+
+#include <cstdint>
+
+#include <Eigen/Core>
+
+#include "components/state_estimator/measurement.hpp"
+#include "components/state_estimator/state.hpp"
+
+namespace adit::state_estimator {
+
+// Chi-square quantile for 1 to 3 degrees of freedom, to be compared with the squared Mahalanobis distance.
+enum class Quantile { p95, p99, p99_9, p99_99 };
+double chi_square(int dof, Quantile quantile);
+
+// A linearized measurement in its informative directions.
+struct Innovation {
+  int rows = 0;
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, kMaxRows, kStates> jacobian = Eigen::Matrix<double, kMaxRows, kStates>::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of the measurement
+};
+Innovation project(const Linearization& linearization, const Measurement& measurement);
+
+// Squared Mahalanobis distance nu' S^-1 nu (NIS). Negative when S is not positive definite.
+double squared_distance(const FilterState& state, const Innovation& innovation);
+
+// x += K nu, P = (I - K H) P (I - K H)' + K R K' (Joseph), angles wrapped, P symmetric. Returns false and changes
+// nothing when the innovation's covariance is not positive definite or the result would not be finite.
+bool correct(FilterState& state, const Innovation& innovation);
+
+}  // namespace adit::state_estimator

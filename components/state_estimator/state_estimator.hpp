@@ -1,0 +1,165 @@
+// The estimator a program uses: odometries, IMU and GNSS in, pose and status out at any rate.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/state_estimator/config.hpp"
+#include "components/state_estimator/replay_buffer.hpp"
+
+namespace adit::state_estimator {
+
+// What became of an input. Everything but `fused` and `first` is counted in the sensor's report.
+enum class Verdict {
+  fused,            // handed to the filter (its gate may still refuse it: see SensorReport)
+  first,            // the first pose of an odometry: the next one makes a motion
+  too_old,          // before the history
+  duplicate,        // this sensor and stamp are known
+  from_the_future,  // later than now
+  malformed,        // NaN, not a rotation, negative variance, ...
+  gap,              // not after the previous pose, or too long after it
+  jump,             // a motion beyond all limits: the odometry restarted
+  unknown_sensor,
+};
+
+struct OdometrySample {
+  std::int64_t stamp_ns = kNoStamp;
+  Pose pose = Pose::Identity();  // of the sensor frame in the odometry's own frame
+  // Information of the motion since the sample before (or of the pose in the local map, with anchor_period_s), right
+  // perturbation [rho; theta]; nothing: configured deviations.
+  std::optional<Matrix6d> information;
+  std::uint64_t frame = 0;  // another value: the odometry's frame is a new one (restart, re-initialization)
+  double suspicion = 0.0;
+};
+
+struct ImuSample {
+  std::int64_t stamp_ns = kNoStamp;
+  Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();    // rad/s, sensor axes
+  Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();  // m/s^2, sensor axes
+};
+
+struct GnssSample {
+  std::int64_t stamp_ns = kNoStamp;
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();        // m, antenna in odom (local level east-north frame)
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();  // m^2
+};
+
+enum class Mode { initializing, fused, lidar, thermal, other, dead_reckoning };
+const char* to_string(Mode mode);
+
+struct Estimate {
+  std::int64_t stamp_ns = kNoStamp;
+  Pose pose = Pose::Identity();  // base_link in odom: planar position and heading by the filter; height, roll and
+                                 // pitch carried over from the odometry and the IMU
+  double speed = 0.0, accel = 0.0, yaw_rate = 0.0, yaw_accel = 0.0;
+  Eigen::Matrix3d pose_covariance = Eigen::Matrix3d::Zero();   // (x, y, yaw) in odom
+  Eigen::Matrix2d twist_covariance = Eigen::Matrix2d::Zero();  // (speed, yaw rate)
+};
+
+// Motion between two instants with the covariance of exactly this motion: the prior for a front end. It contains what
+// the same front end delivered before `to`; a front end that optimizes with it must hand back the likelihood alone.
+struct RelativePrediction {
+  PlanarPose motion = PlanarPose::Zero();  // base_link at `to` in base_link at `from`
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  double thermal_scale = 1.0;  // thermal length / true length
+};
+
+struct SensorReport {
+  std::string name;
+  bool healthy = false;  // fused something within outage_s and not distrusted
+  bool distrusted = false;
+  double age_s = -1.0;  // since the last fused measurement; negative: never
+  double nis = 0.0;     // of the last examined measurement,
+  int nis_dof = 0;      // with so many rows
+  double mean_nis_per_dof = 0.0;
+  std::uint64_t accepted = 0, rejected = 0, distrusted_count = 0, unanchored = 0, uninformative = 0, forced = 0;
+  std::uint64_t too_old = 0, duplicates = 0, future = 0, malformed = 0, gaps = 0, jumps = 0;
+};
+
+struct Status {
+  Mode mode = Mode::initializing;
+  bool conflict = false;
+  double thermal_scale = 1.0, thermal_scale_sigma = 0.0;
+  std::uint64_t clock_jumps = 0, forgotten_motions = 0, replays = 0;
+  std::uint64_t closures = 0, closures_rejected = 0;
+  std::vector<SensorReport> sensors;
+};
+
+// Not thread safe: one strand. No heap after construction, but for status(). `now_ns` is the caller's clock at the
+// call, used to tell late from future and to notice that the clock was set; offline: the stamp of the message.
+class StateEstimator {
+ public:
+  static Result<std::unique_ptr<StateEstimator>> create(const Config& config);
+
+  // Starts at an instant, at the configured initial pose; without a call the first measurement does it.
+  void start(std::int64_t now_ns);
+  bool started() const { return started_; }
+
+  // Index by name; -1 when there is none. Names: those of the configuration, "imu", "gnss", "zero_velocity".
+  int sensor(const std::string& name) const;
+
+  Verdict add_odometry(int sensor, const OdometrySample& sample, std::int64_t now_ns);
+  Verdict add_motion(int sensor, const RelativeMotion& motion, std::int64_t now_ns);
+  Verdict add_imu(const ImuSample& sample, std::int64_t now_ns);
+  Verdict add_gnss(const GnssSample& sample, std::int64_t now_ns);
+  // Any sensor of one's own: add_sensor() before the first measurement, then measurements of its model.
+  int add_sensor(const std::string& name, SensorModel model);
+  Verdict add_measurement(const Measurement& measurement, std::int64_t now_ns);
+
+  // An absolute pose in map (loop closure, map matching): corrects map -> odom, never odom.
+  MapCorrection::Outcome add_closure(std::int64_t stamp_ns, const PlanarPose& map_body,
+                                     const Eigen::Matrix3d& covariance);
+  const MapCorrection& map_correction() const { return map_; }
+
+  // The pose at an instant within the history or later; before: nothing. Finite for every finite input.
+  std::optional<Estimate> estimate(std::int64_t stamp_ns) const;
+  // For publishing: as estimate(), and never an instant before the one published last.
+  std::optional<Estimate> publish(std::int64_t now_ns);
+  std::optional<RelativePrediction> predict_motion(std::int64_t from_ns, std::int64_t to_ns) const;
+  Status status(std::int64_t now_ns) const;
+  const FilterState& state() const { return replay_.head(); }
+
+ private:
+  struct Counters {
+    std::uint64_t too_old = 0, duplicates = 0, future = 0, malformed = 0, gaps = 0, jumps = 0;
+  };
+  struct Odometry {
+    OdometrySensor config;
+    std::optional<OdometrySample> anchor;    // what the next motion starts from
+    std::optional<OdometrySample> previous;  // the sample before
+  };
+
+  explicit StateEstimator(const Config& config);
+  Verdict count(int sensor, Verdict verdict);
+  bool watch_clock(std::int64_t now_ns);
+  void restart_at(std::int64_t stamp_ns);
+  Verdict insert(const Measurement& measurement, std::int64_t now_ns);
+  void maybe_stand_still(std::int64_t stamp_ns, std::int64_t now_ns);
+  void carry_attitude(const Odometry& odometry, const Pose& from, const OdometrySample& to);
+  Estimate to_estimate(const FilterState& state) const;
+
+  Config config_;
+  Filter filter_;
+  ReplayBuffer replay_;
+  MapCorrection map_;
+  Tilt tilt_;
+  StandstillDetector standstill_;
+  std::vector<Odometry> odometries_;  // by sensor index
+  std::vector<std::string> names_;
+  std::array<Counters, kMaxSensors> counters_;
+  int imu_ = -1, gnss_ = -1, zero_velocity_ = -1;
+  bool started_ = false;
+  std::int64_t now_ns_ = kNoStamp, published_ns_ = kNoStamp, zero_velocity_ns_ = kNoStamp;
+  std::int64_t closure_ns_ = kNoStamp;
+  std::uint64_t clock_jumps_ = 0, forgotten_motions_ = 0, replays_ = 0;
+  double height_ = 0.0;
+  int height_from_ = -1;
+  std::int64_t height_ns_ = kNoStamp;
+  Eigen::Matrix3d tilt_from_odometry_ = Eigen::Matrix3d::Identity();
+};
+
+}  // namespace adit::state_estimator

@@ -1,0 +1,483 @@
+#include "components/state_estimator/state_estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <limits>
+#include <new>
+
+#include "components/state_estimator/measurement_models.hpp"
+#include "components/state_estimator/test_support.hpp"
+
+// Counts what the whole program allocates, for the no-allocation test.
+namespace {
+std::atomic<std::uint64_t> allocations{0};
+}
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+
+namespace adit::state_estimator {
+namespace {
+
+using test::kMillisecond;
+using test::kSecond;
+using test::planar;
+
+std::unique_ptr<StateEstimator> make(const Config& config) {
+  Result<std::unique_ptr<StateEstimator>> made = StateEstimator::create(config);
+  EXPECT_TRUE(made) << (made ? "" : made.error().message);
+  return std::move(*made);
+}
+
+OdometrySample sample(std::int64_t stamp, const Pose& pose) {
+  OdometrySample s;
+  s.stamp_ns = stamp;
+  s.pose = pose;
+  return s;
+}
+
+// A circle of 20 m radius at 2 m/s, seen by both odometries.
+Pose on_circle(std::int64_t t) {
+  const double angle = 0.1 * seconds_between(0, t);
+  return planar(20.0 * std::sin(angle), 20.0 * (1.0 - std::cos(angle)), angle);
+}
+
+struct Run {
+  std::unique_ptr<StateEstimator> estimator;
+  std::int64_t now = 0;
+  std::function<bool(std::int64_t)> lidar = [](std::int64_t) { return true; };
+  std::function<bool(std::int64_t)> thermal = [](std::int64_t) { return true; };
+  double largest_jump = 0.0;
+  int silent = 0;
+
+  explicit Run(const Config& config) : estimator(make(config)) { estimator->start(0); }
+
+  void until(std::int64_t end) {
+    std::optional<Estimate> last = estimator->estimate(now);
+    while (now < end) {
+      now += 10 * kMillisecond;
+      if (now % (100 * kMillisecond) == 0 && lidar(now)) {
+        estimator->add_odometry(0, sample(now - 50 * kMillisecond, on_circle(now - 50 * kMillisecond)), now);
+      }
+      if (now % (40 * kMillisecond) == 0 && thermal(now)) {
+        estimator->add_odometry(1, sample(now - 20 * kMillisecond, on_circle(now - 20 * kMillisecond)), now);
+      }
+      const std::optional<Estimate> e = estimator->publish(now);
+      if (!e || !e->pose.matrix().allFinite() || !e->pose_covariance.allFinite()) {
+        ++silent;
+        continue;
+      }
+      if (last) {
+        const Pose step = last->pose.inverse() * e->pose;
+        largest_jump = std::max(largest_jump, std::abs(step.translation().norm() - std::abs(e->speed) * 0.01));
+      }
+      last = e;
+    }
+  }
+  double error() const { return (estimator->estimate(now)->pose.translation() - on_circle(now).translation()).norm(); }
+};
+
+TEST(StateEstimator, FollowsBothSensorsInEveryMode) {
+  for (const Config& config : {Config::standard(), Config::paper(), Config::predecessor()}) {
+    Run run(config);
+    run.until(60 * kSecond);
+    const Status status = run.estimator->status(run.now);
+    EXPECT_EQ(status.mode, Mode::fused);
+    EXPECT_EQ(run.silent, 0);
+    EXPECT_LT(run.error(), 1.5);
+    EXPECT_NEAR(run.estimator->estimate(run.now)->speed, 2.0, 0.1);
+    EXPECT_NEAR(run.estimator->estimate(run.now)->yaw_rate, 0.1, 0.01);
+    EXPECT_GT(status.replays, 100u);  // latencies differ: thermal poses overtake the LiDAR's
+    for (int i = 0; i < 2; ++i) EXPECT_GT(status.sensors[i].accepted, 500u) << status.sensors[i].name;
+  }
+}
+
+TEST(StateEstimator, RelativePosesOfExactOdometryGiveTheExactPath) {
+  Run run(Config::standard());
+  run.until(60 * kSecond);
+  EXPECT_LT(run.error(), 0.3);
+}
+
+TEST(StateEstimator, OutagesOfOneBothAndFromTheStart) {
+  Run run(Config::standard());
+  run.lidar = [](std::int64_t t) { return t < 20 * kSecond || t > 30 * kSecond; };
+  run.thermal = [](std::int64_t t) { return t < 25 * kSecond || t > 40 * kSecond; };
+  const auto mode = [&] { return run.estimator->status(run.now).mode; };
+  run.until(19 * kSecond);
+  EXPECT_EQ(mode(), Mode::fused);
+  run.until(22 * kSecond);
+  EXPECT_EQ(mode(), Mode::thermal);
+  run.until(28 * kSecond);
+  EXPECT_EQ(mode(), Mode::dead_reckoning);
+  run.until(32 * kSecond);
+  EXPECT_EQ(mode(), Mode::lidar);
+  run.until(50 * kSecond);
+  EXPECT_EQ(mode(), Mode::fused);
+  EXPECT_EQ(run.silent, 0);
+  EXPECT_LT(run.largest_jump, 0.05);
+  EXPECT_LT(run.error(), 1.5);
+
+  Run nothing(Config::standard());
+  nothing.lidar = nothing.thermal = [](std::int64_t) { return false; };
+  nothing.until(20 * kSecond);
+  EXPECT_EQ(nothing.silent, 0);
+  EXPECT_EQ(nothing.estimator->status(nothing.now).mode, Mode::dead_reckoning);
+  Run lonely(Config::standard());
+  lonely.lidar = [](std::int64_t) { return false; };
+  lonely.until(20 * kSecond);
+  EXPECT_EQ(lonely.estimator->status(lonely.now).mode, Mode::thermal);
+  EXPECT_EQ(lonely.silent, 0);
+}
+
+TEST(StateEstimator, CovarianceOfAnOutageGrowsAndCoversTheError) {
+  Run run(Config::standard());
+  run.lidar = run.thermal = [](std::int64_t t) { return t < 20 * kSecond; };
+  run.until(20 * kSecond);
+  const double before = run.estimator->estimate(run.now)->pose_covariance(0, 0);
+  run.until(30 * kSecond);
+  const Estimate e = *run.estimator->estimate(run.now);
+  EXPECT_GT(e.pose_covariance(0, 0), 100.0 * before);
+  const Eigen::Vector2d error = e.pose.translation().head<2>() - on_circle(run.now).translation().head<2>();
+  const Eigen::Matrix2d p = e.pose_covariance.topLeftCorner<2, 2>();
+  EXPECT_LT(error.dot(p.inverse() * error), 9.21);
+}
+
+TEST(StateEstimator, BadInputIsCountedAndHarmless) {
+  Run run(Config::standard());
+  run.until(10 * kSecond);
+  StateEstimator& e = *run.estimator;
+  const std::int64_t now = run.now;
+  const FilterState before = e.state();
+  Pose nan = Pose::Identity();
+  nan.translation().x() = std::nan("");
+  EXPECT_EQ(e.add_odometry(0, sample(now, nan), now), Verdict::malformed);
+  EXPECT_EQ(e.add_odometry(0, sample(now + 10 * kSecond, Pose::Identity()), now), Verdict::from_the_future);
+  EXPECT_EQ(e.add_odometry(7, sample(now, Pose::Identity()), now), Verdict::unknown_sensor);
+  EXPECT_EQ(e.add_odometry(-1, sample(now, Pose::Identity()), now), Verdict::unknown_sensor);
+  EXPECT_EQ(e.add_imu({}, now), Verdict::unknown_sensor);  // none configured
+  EXPECT_EQ(e.add_gnss({}, now), Verdict::unknown_sensor);
+  RelativeMotion old;
+  old.from_ns = now - 9 * kSecond;
+  old.to_ns = old.from_ns + 100 * kMillisecond;
+  EXPECT_EQ(e.add_motion(0, old, now), Verdict::too_old);
+  RelativeMotion bad = old;
+  bad.from_ns = now - kSecond;
+  bad.to_ns = bad.from_ns + 100 * kMillisecond;
+  bad.information = Matrix6d::Constant(std::numeric_limits<double>::infinity());
+  EXPECT_EQ(e.add_motion(0, bad, now), Verdict::malformed);
+  EXPECT_EQ((e.state().x - before.x).norm(), 0.0);
+  OdometrySample twice = sample(now - 50 * kMillisecond, on_circle(now - 50 * kMillisecond));
+  EXPECT_EQ(e.add_odometry(0, twice, now), Verdict::duplicate);
+  const SensorReport r = e.status(now).sensors[0];
+  EXPECT_EQ(r.malformed, 2u);
+  EXPECT_EQ(r.future, 1u);
+  EXPECT_EQ(r.too_old, 1u);
+  EXPECT_EQ(r.duplicates, 1u);
+  // Any information matrix that is finite is survived: none, absurdly large, indefinite.
+  for (const double strength : {0.0, 1e300, 1e-300, -1e6}) {
+    OdometrySample s = sample(run.now + 50 * kMillisecond, on_circle(run.now + 50 * kMillisecond));
+    s.information = strength * Matrix6d::Identity();
+    run.now += 100 * kMillisecond;
+    e.add_odometry(0, s, run.now);
+    EXPECT_TRUE(e.state().x.allFinite());
+    EXPECT_TRUE(e.state().p.allFinite());
+  }
+  run.until(20 * kSecond);
+  EXPECT_LT(run.error(), 1.0);
+  EXPECT_EQ(run.silent, 0);
+}
+
+TEST(StateEstimator, ARestartedOdometryDoesNotMoveTheRobot) {
+  Config config = Config::standard();
+  Run run(config);
+  run.until(10 * kSecond);
+  StateEstimator& e = *run.estimator;
+  // Without a word: the pose jumps by 100 m.
+  const Pose offset = planar(100.0, -30.0, 2.0);
+  std::int64_t t = run.now + 50 * kMillisecond;
+  EXPECT_EQ(e.add_odometry(0, sample(t, offset * on_circle(t)), t), Verdict::jump);
+  // With a new frame.
+  OdometrySample fresh = sample(t + 100 * kMillisecond, on_circle(0));
+  fresh.frame = 1;
+  EXPECT_EQ(e.add_odometry(0, fresh, t + 100 * kMillisecond), Verdict::first);
+  fresh.stamp_ns += 100 * kMillisecond;
+  fresh.pose = on_circle(100 * kMillisecond);
+  EXPECT_EQ(e.add_odometry(0, fresh, t + 200 * kMillisecond), Verdict::fused);
+  const Estimate estimate = *e.estimate(t + 150 * kMillisecond);
+  EXPECT_LT((estimate.pose.translation() - on_circle(t + 150 * kMillisecond).translation()).norm(), 0.5);
+  // A pause longer than max_interval_s is a gap, not a motion.
+  fresh.stamp_ns += 2 * kSecond;
+  EXPECT_EQ(e.add_odometry(0, fresh, fresh.stamp_ns), Verdict::gap);
+  EXPECT_EQ(e.status(fresh.stamp_ns).sensors[0].gaps, 1u);
+}
+
+TEST(StateEstimator, ClockSetBackKeepsThePoseAndGoesOn) {
+  Run run(Config::standard());
+  run.until(60 * kSecond);
+  const Pose before = run.estimator->estimate(run.now)->pose;
+  // The bag starts over: same stamps again.
+  run.now = 30 * kSecond;
+  ASSERT_TRUE(run.estimator->publish(run.now));
+  EXPECT_LT((run.estimator->estimate(run.now)->pose.translation() - before.translation()).norm(), 1e-9);
+  const Status jumped = run.estimator->status(run.now);
+  EXPECT_EQ(jumped.clock_jumps, 1u);
+  run.until(40 * kSecond);
+  EXPECT_EQ(run.silent, 0);
+  const Status status = run.estimator->status(run.now);
+  EXPECT_EQ(status.clock_jumps, 1u);
+  EXPECT_EQ(status.mode, Mode::fused);
+  EXPECT_NEAR(run.estimator->estimate(run.now)->speed, 2.0, 0.1);
+}
+
+TEST(StateEstimator, ClockSetForwardForgetsTheMotionNotThePose) {
+  Run run(Config::standard());
+  run.until(10 * kSecond);
+  run.now += 1'000'000 * kSecond;
+  run.estimator->publish(run.now);
+  run.now -= run.now % (200 * kMillisecond);
+  for (int i = 0; i < 20; ++i) {
+    run.now += 100 * kMillisecond;
+    run.estimator->add_odometry(0, sample(run.now, on_circle(i * 100 * kMillisecond)), run.now);
+  }
+  EXPECT_EQ(run.estimator->status(run.now).forgotten_motions, 1u);
+  EXPECT_TRUE(run.estimator->state().p.allFinite());
+  EXPECT_NEAR(run.estimator->estimate(run.now)->speed, 2.0, 0.1);
+}
+
+TEST(StateEstimator, PublishedStampsNeverGoBack) {
+  Run run(Config::standard());
+  run.until(5 * kSecond);
+  EXPECT_FALSE(run.estimator->publish(run.now));
+  EXPECT_FALSE(run.estimator->publish(run.now - 100 * kMillisecond));
+  EXPECT_TRUE(run.estimator->publish(run.now + 1));
+}
+
+TEST(StateEstimator, WithoutAbsoluteSensorsHeadingVarianceNeverShrinks) {
+  std::unique_ptr<StateEstimator> paper = make(Config::paper());
+  paper->start(0);
+  double last = 0.0;
+  for (std::int64_t t = 100 * kMillisecond; t < 60 * kSecond; t += 100 * kMillisecond) {
+    paper->add_odometry(0, sample(t, on_circle(t)), t);
+    const double variance = paper->state().p(kYaw, kYaw);
+    EXPECT_GE(variance, last * (1.0 - 1e-12));
+    last = variance;
+  }
+}
+
+TEST(StateEstimator, ThermalScaleAndBiasAreFoundAndCarriedThroughAnOutage) {
+  Run run(Config::standard());
+  // The thermal odometry is 8 % short and turns 2 mrad/s too much. 60 s with LiDAR, 30 s without.
+  StateEstimator& e = *run.estimator;
+  Pose thermal = Pose::Identity();
+  std::int64_t last = 0;
+  const auto drive = [&](std::int64_t end, bool with_lidar) {
+    while (run.now < end) {
+      run.now += 10 * kMillisecond;
+      if (with_lidar && run.now % (100 * kMillisecond) == 0) {
+        e.add_odometry(0, sample(run.now, on_circle(run.now)), run.now);
+      }
+      if (run.now % (40 * kMillisecond) != 0) continue;
+      Pose step = on_circle(last).inverse() * on_circle(run.now);
+      step.translation() *= 0.92;
+      step.linear() = step.linear() * so3_exp({0.0, 0.0, 0.002 * seconds_between(last, run.now)});
+      thermal = thermal * step;
+      e.add_odometry(1, sample(run.now, thermal), run.now);
+      last = run.now;
+    }
+  };
+  drive(60 * kSecond, true);
+  EXPECT_NEAR(e.status(run.now).thermal_scale, 0.92, 0.01);
+  EXPECT_NEAR(e.state().x(kThermalYawBias), 0.002, 0.0005);
+  const double before = run.error();
+  drive(90 * kSecond, false);
+  EXPECT_LT(run.error() - before, 0.6);  // 1 % of 60 m; without the scale state it would be 4.8 m
+  EXPECT_EQ(e.status(run.now).mode, Mode::thermal);
+}
+
+TEST(StateEstimator, RelativePredictionHasTheCovarianceOfTheMotionAlone) {
+  Run run(Config::standard());
+  run.until(60 * kSecond);
+  const std::int64_t from = run.now - 200 * kMillisecond, to = run.now + 100 * kMillisecond;
+  const std::optional<RelativePrediction> p = run.estimator->predict_motion(from, to);
+  ASSERT_TRUE(p);
+  const Pose truth = on_circle(from).inverse() * on_circle(to);
+  EXPECT_NEAR(p->motion.x(), truth.translation().x(), 0.03);
+  EXPECT_NEAR(p->motion.z(), 0.03, 0.005);
+  const Estimate e = *run.estimator->estimate(to);
+  EXPECT_LT(p->covariance(0, 0), 0.2 * e.pose_covariance.topLeftCorner<2, 2>().trace());
+  EXPECT_GT(p->covariance(0, 0), 0.0);
+  EXPECT_FALSE(run.estimator->predict_motion(to, from));
+  EXPECT_FALSE(run.estimator->predict_motion(run.now - 20 * kSecond, to));
+}
+
+TEST(StateEstimator, ClosureMovesTheMapNotOdom) {
+  Run run(Config::standard());
+  run.until(30 * kSecond);
+  const Pose before = run.estimator->estimate(run.now)->pose;
+  const PlanarPose truth(50.0, 60.0, 1.0);
+  EXPECT_EQ(run.estimator->add_closure(run.now - kSecond, truth, 1e-4 * Eigen::Matrix3d::Identity()),
+            MapCorrection::Outcome::applied);
+  EXPECT_EQ((run.estimator->estimate(run.now)->pose.matrix() - before.matrix()).norm(), 0.0);
+  const Estimate then = *run.estimator->estimate(run.now - kSecond);
+  const PlanarPose odom(then.pose.translation().x(), then.pose.translation().y(), yaw(then.pose.linear()));
+  EXPECT_LT((compose(run.estimator->map_correction().map_odom(), odom) - truth).norm(), 0.05);
+  EXPECT_EQ(run.estimator->add_closure(-kSecond, truth, Eigen::Matrix3d::Identity()),
+            MapCorrection::Outcome::malformed);
+}
+
+TEST(StateEstimator, StandsStillWithZeroVelocityUpdates) {
+  Config config = Config::standard();
+  config.imu.enabled = true;
+  std::unique_ptr<StateEstimator> e = make(config);
+  e->start(0);
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  std::int64_t now = 0;
+  for (; now < 60 * kSecond; now += 5 * kMillisecond) {
+    ImuSample imu;
+    imu.stamp_ns = now;
+    imu.angular_rate = 0.002 * Eigen::Vector3d(normal(random), normal(random), normal(random)) +
+                       Eigen::Vector3d(0, 0, 0.01);  // a bias
+    imu.specific_force =
+        0.03 * Eigen::Vector3d(normal(random), normal(random), normal(random)) + Eigen::Vector3d(0.0, 0.0, 9.81);
+    e->add_imu(imu, now);
+    if (now % (100 * kMillisecond) == 0) {
+      e->add_odometry(0, sample(now, planar(0.003 * normal(random), 0.003 * normal(random), 0.0)), now);
+    }
+  }
+  const Estimate estimate = *e->estimate(now);
+  EXPECT_LT(std::abs(estimate.speed), 0.01);
+  EXPECT_LT(estimate.pose.translation().norm(), 0.1);
+  EXPECT_LT(std::abs(yaw(estimate.pose.linear())), 0.01);
+  EXPECT_NEAR(e->state().x(kGyroBias), 0.01, 0.001);
+  EXPECT_GT(e->status(now).sensors[static_cast<std::size_t>(e->sensor("zero_velocity"))].accepted, 100u);
+}
+
+TEST(StateEstimator, GnssAnchorsAndMultipathIsRejected) {
+  Config config = Config::predecessor();
+  config.gate.enabled = true;
+  std::unique_ptr<StateEstimator> e = make(config);
+  e->start(0);
+  std::mt19937_64 random(10);
+  std::normal_distribution<double> normal;
+  std::int64_t now = 0;
+  int wrong = 0;
+  for (; now < 60 * kSecond; now += 100 * kMillisecond) {
+    e->add_odometry(0, sample(now, planar(3.0, 4.0, 0.3).inverse() * on_circle(now)), now);
+    if (now % kSecond != 0) continue;
+    GnssSample fix;
+    fix.stamp_ns = now;
+    const Eigen::Vector2d truth = on_circle(now).translation().head<2>();
+    fix.position = truth + 0.05 * Eigen::Vector2d(normal(random), normal(random));
+    fix.covariance = 0.0025 * Eigen::Matrix2d::Identity();
+    if (now > 30 * kSecond && now % (5 * kSecond) == 0) {
+      fix.position.x() += 10.0;
+      ++wrong;
+    }
+    e->add_gnss(fix, now);
+  }
+  EXPECT_LT((e->estimate(now - 1)->pose.translation() - on_circle(now - 1).translation()).norm(), 0.3);
+  const SensorReport gnss = e->status(now).sensors[static_cast<std::size_t>(e->sensor("gnss"))];
+  EXPECT_EQ(gnss.rejected, static_cast<std::uint64_t>(wrong));
+  GnssSample bad;
+  bad.covariance.setZero();
+  EXPECT_EQ(e->add_gnss(bad, now), Verdict::malformed);
+}
+
+TEST(StateEstimator, ANewSensorIsOneModelAndOneCall) {
+  Config config = Config::standard();
+  config.odometries.resize(1);
+  std::unique_ptr<StateEstimator> e = make(config);
+  SensorModel wheel;
+  wheel.model = std::make_unique<Speed>();
+  wheel.moves = true;
+  const int index = e->add_sensor("wheel", std::move(wheel));
+  ASSERT_GE(index, 0);
+  e->start(0);
+  for (std::int64_t t = 20 * kMillisecond; t < 5 * kSecond; t += 20 * kMillisecond) {
+    Measurement m;
+    m.sensor = static_cast<std::uint8_t>(index);
+    m.stamp_ns = t;
+    m.rows = 1;
+    m.value.x() = 3.0;
+    m.covariance(0, 0) = 0.01;
+    EXPECT_EQ(e->add_measurement(m, t), Verdict::fused);
+  }
+  EXPECT_NEAR(e->estimate(5 * kSecond)->speed, 3.0, 0.05);
+}
+
+TEST(StateEstimator, HeightAndTiltAreCarriedFromTheOdometry) {
+  std::unique_ptr<StateEstimator> e = make(Config::standard());
+  e->start(0);
+  const Eigen::Matrix3d nose_up = so3_exp({0.0, -0.1, 0.0});
+  for (int i = 0; i <= 100; ++i) {
+    Pose pose = planar(0.2 * i * std::cos(0.1), 0.0, 0.0);
+    pose.translation().z() = 0.2 * i * std::sin(0.1);
+    pose.linear() = nose_up;
+    e->add_odometry(0, sample(i * 100 * kMillisecond, pose), i * 100 * kMillisecond);
+  }
+  const Estimate estimate = *e->estimate(10 * kSecond);
+  EXPECT_NEAR(estimate.pose.translation().z(), 20.0 * std::sin(0.1), 1e-6);
+  EXPECT_NEAR(estimate.pose.translation().x(), 20.0 * std::cos(0.1), 0.1);
+  EXPECT_LT((estimate.pose.linear() - nose_up).norm(), 0.01);
+}
+
+TEST(StateEstimator, SteadyStateDoesNotAllocate) {
+  Config config = Config::standard();
+  config.imu.enabled = true;
+  std::unique_ptr<StateEstimator> e = make(config);
+  e->start(0);
+  const auto run = [&](std::int64_t from, std::int64_t to) {
+    for (std::int64_t now = from; now < to; now += 10 * kMillisecond) {
+      ImuSample imu;
+      imu.stamp_ns = now;
+      imu.angular_rate.z() = 0.1;
+      imu.specific_force.z() = 9.81;
+      e->add_imu(imu, now);
+      if (now % (100 * kMillisecond) == 0) {
+        e->add_odometry(0, sample(now - 50 * kMillisecond, on_circle(now - 50 * kMillisecond)), now);
+      }
+      if (now % (30 * kMillisecond) == 0) e->add_odometry(1, sample(now, on_circle(now)), now);
+      e->publish(now);
+      e->predict_motion(now - 100 * kMillisecond, now + 50 * kMillisecond);
+    }
+  };
+  run(kSecond, 3 * kSecond);
+  const std::uint64_t before = allocations;
+  run(3 * kSecond, 30 * kSecond);
+  EXPECT_EQ(allocations - before, 0u);
+}
+
+TEST(Config, ChecksNameWhatIsWrong) {
+  Config config = Config::standard();
+  config.odometries[1].name = "lidar";
+  EXPECT_FALSE(StateEstimator::create(config));
+  config = Config::standard();
+  config.odometries.push_back(config.odometries[0]);
+  config.odometries[2].name = "third";
+  const Result<void> three = check(config);
+  ASSERT_FALSE(three);
+  EXPECT_NE(three.error().message.find("relative_pose"), std::string::npos);
+  config = Config::standard();
+  config.process.noise.jerk = -1.0;
+  EXPECT_FALSE(check(config));
+  config = Config::standard();
+  config.odometries[0].odometry.sigma_yaw = std::nan("");
+  EXPECT_FALSE(check(config));
+  for (const Config& good : {Config::standard(), Config::paper(), Config::predecessor()}) EXPECT_TRUE(check(good));
+}
+
+}  // namespace
+}  // namespace adit::state_estimator
