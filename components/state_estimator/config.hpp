@@ -66,10 +66,12 @@ struct Config {
   std::vector<OdometrySensor> odometries;
   ImuSensor imu;
   GnssSensor gnss;
-  double future_tolerance_s = 0.1;   // stamps later than now by more than this are refused
-  double clock_jump_s = 2.0;         // now moving back by more than this is another clock: the filter re-stamps itself
-  double longest_silence_s = 120.0;  // after this the motion is forgotten, the pose kept
-  double outage_s = 0.5;             // a sensor silent for longer is out
+  double future_tolerance_s = 0.1;  // stamps later than now by more than this are refused
+  double clock_jump_s = 2.0;        // now moving back by more than this is another clock: the filter re-stamps itself
+  double longest_silence_s = 60.0;  // after this the motion is forgotten, the pose kept
+  // A correction that would move the published pose by more than this at once is let in over smoothing_s instead.
+  double largest_jump_m = 0.02, largest_jump_rad = 0.005, smoothing_s = 0.4;  // smoothing_s 0: off
+  double outage_s = 0.5;                                                      // a sensor silent for longer is out
 
   // arXiv 2505.03565: 7 states, fixed diagonal process noise and fixed measurement noise, (v, psi') from a LiDAR and a
   // thermal odometry, no gate, no calibration states, no decay.

@@ -94,8 +94,10 @@ bool Filter::let_in_again(FilterState& state, const Measurement& m) const {
   }
   const bool claims_rest = own.window.zero_since_ns != kNoStamp && !stands(state);
   if (claims_rest && seconds_between(own.window.zero_since_ns, m.stamp_ns) < gate.zero_motion_patience_s) return false;
-  state.p(kSpeed, kSpeed) += gate.lockout_speed * gate.lockout_speed;
-  state.p(kYawRate, kYawRate) += gate.lockout_yaw_rate * gate.lockout_yaw_rate;
+  const double speed = m.motion.has_speed ? m.motion.speed - state.x(kSpeed) : 0.0;
+  const double yaw_rate = m.motion.valid ? m.motion.yaw_rate - state.x(kYawRate) : 0.0;
+  state.p(kSpeed, kSpeed) += std::max(gate.lockout_speed * gate.lockout_speed, speed * speed);
+  state.p(kYawRate, kYawRate) += std::max(gate.lockout_yaw_rate * gate.lockout_yaw_rate, yaw_rate * yaw_rate);
   return true;
 }
 

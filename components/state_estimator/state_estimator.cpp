@@ -127,9 +127,12 @@ void StateEstimator::start(std::int64_t now_ns) {
   started_ = true;
 }
 
-// Keeps the pose, forgets the motion, the clones and everything that carries a stamp.
-void StateEstimator::restart_at(std::int64_t stamp_ns) {
-  const FilterState& old = replay_.head();
+// Keeps the pose of an instant, forgets the motion, the clones and everything that carries a stamp.
+void StateEstimator::restart_at(std::int64_t stamp_ns, std::int64_t pose_of_ns) {
+  FilterState old = replay_.head();
+  // No further ahead than a silence may be: beyond, the covariance only loses digits.
+  const std::int64_t silence_ns = static_cast<std::int64_t>(config_.longest_silence_s * 1e9);
+  predict(old, pose_of_ns - old.stamp_ns > silence_ns ? old.stamp_ns + silence_ns : pose_of_ns, filter_.process);
   FilterState fresh = initial_state(config_.initial, config_, stamp_ns);
   constexpr int kept[] = {kX, kY, kYaw, kScale, kThermalYawBias, kGyroBias, kAccelBias};
   for (const int i : kept) {
@@ -149,13 +152,14 @@ void StateEstimator::restart_at(std::int64_t stamp_ns) {
   tilt_ = Tilt(config_.imu.tilt);
   standstill_ = StandstillDetector(config_.imu.standstill);
   published_ns_ = zero_velocity_ns_ = height_ns_ = closure_ns_ = kNoStamp;
+  last_output_ = std::nullopt;
 }
 
 bool StateEstimator::watch_clock(std::int64_t now_ns) {
   const bool back = started_ && now_ns_ != kNoStamp && seconds_between(now_ns, now_ns_) > config_.clock_jump_s;
   if (back) {
     ++clock_jumps_;
-    restart_at(now_ns);
+    restart_at(now_ns, now_ns_);
   }
   now_ns_ = now_ns_ == kNoStamp || back ? now_ns : std::max(now_ns_, now_ns);
   return back;
@@ -195,12 +199,8 @@ Verdict StateEstimator::insert(const Measurement& m, std::int64_t now_ns) {
   const std::int64_t earliest = relative ? m.anchor_ns : m.stamp_ns;
   if (!started_) start(earliest - 200'000'000);
   if (seconds_between(replay_.head().stamp_ns, earliest) > config_.longest_silence_s) {
-    const std::optional<FilterState> grown = replay_.state_at(earliest);
-    if (grown) {
-      replay_.restart(*grown);
-      restart_at(earliest);
-      ++forgotten_motions_;
-    }
+    restart_at(earliest, earliest);
+    ++forgotten_motions_;
   }
   if (relative && !replay_.has_anchor(m.sensor, m.anchor_ns)) {
     Measurement clone;
@@ -448,8 +448,41 @@ std::optional<Estimate> StateEstimator::publish(std::int64_t now_ns) {
   watch_clock(now_ns);
   if (published_ns_ != kNoStamp && now_ns <= published_ns_) return std::nullopt;
   std::optional<Estimate> e = estimate(now_ns);
-  if (e) published_ns_ = now_ns;
+  if (!e) return e;
+  published_ns_ = now_ns;
+  smooth(*e);
   return e;
+}
+
+// The part of a correction beyond the permitted jump is taken off the output and given back over smoothing_s.
+void StateEstimator::smooth(Estimate& e) {
+  const Estimate raw = e;
+  if (config_.smoothing_s > 0.0 && last_output_) {
+    const double dt = seconds_between(last_output_->stamp_ns, e.stamp_ns);
+    const PlanarPose before(last_output_->pose.translation().x(), last_output_->pose.translation().y(),
+                            yaw(last_output_->pose.linear()));
+    const double turn = last_output_->yaw_rate * dt;
+    const PlanarPose expected = compose(before, {last_output_->speed * dt * std::cos(0.5 * turn),
+                                                 last_output_->speed * dt * std::sin(0.5 * turn), turn});
+    const PlanarPose now(e.pose.translation().x(), e.pose.translation().y(), yaw(e.pose.linear()));
+    PlanarPose jump = now - expected;
+    jump.z() = wrap_angle(jump.z());
+    not_yet_shown_ *= std::exp(-dt / config_.smoothing_s);
+    // Seldom outputs (several hundred ms apart) move on by themselves: what they do in between is no jump.
+    const double distance = jump.head<2>().norm();
+    const bool often = dt < 0.3;
+    if (often && distance > config_.largest_jump_m) {
+      not_yet_shown_.head<2>() -= jump.head<2>() * (1.0 - config_.largest_jump_m / distance);
+    }
+    if (often && std::abs(jump.z()) > config_.largest_jump_rad) {
+      not_yet_shown_.z() -= jump.z() * (1.0 - config_.largest_jump_rad / std::abs(jump.z()));
+    }
+    e.pose.translation().head<2>() += not_yet_shown_.head<2>();
+    e.pose.linear() = so3_exp({0.0, 0.0, not_yet_shown_.z()}) * e.pose.linear();
+  } else {
+    not_yet_shown_.setZero();
+  }
+  last_output_ = raw;
 }
 
 std::optional<RelativePrediction> StateEstimator::predict_motion(std::int64_t from_ns, std::int64_t to_ns) const {

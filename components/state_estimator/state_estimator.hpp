@@ -117,7 +117,8 @@ class StateEstimator {
 
   // The pose at an instant within the history or later; before: nothing. Finite for every finite input.
   std::optional<Estimate> estimate(std::int64_t stamp_ns) const;
-  // For publishing: as estimate(), and never an instant before the one published last.
+  // For publishing: as estimate(), but never an instant before the one published last, and continuous: what a
+  // correction moves beyond the configured jump fades in.
   std::optional<Estimate> publish(std::int64_t now_ns);
   std::optional<RelativePrediction> predict_motion(std::int64_t from_ns, std::int64_t to_ns) const;
   Status status(std::int64_t now_ns) const;
@@ -136,7 +137,8 @@ class StateEstimator {
   explicit StateEstimator(const Config& config);
   Verdict count(int sensor, Verdict verdict);
   bool watch_clock(std::int64_t now_ns);
-  void restart_at(std::int64_t stamp_ns);
+  void restart_at(std::int64_t stamp_ns, std::int64_t pose_of_ns);
+  void smooth(Estimate& estimate);
   Verdict insert(const Measurement& measurement, std::int64_t now_ns);
   void maybe_stand_still(std::int64_t stamp_ns, std::int64_t now_ns);
   void carry_attitude(const Odometry& odometry, const Pose& from, const OdometrySample& to);
@@ -156,6 +158,8 @@ class StateEstimator {
   std::int64_t now_ns_ = kNoStamp, published_ns_ = kNoStamp, zero_velocity_ns_ = kNoStamp;
   std::int64_t closure_ns_ = kNoStamp;
   std::uint64_t clock_jumps_ = 0, forgotten_motions_ = 0, replays_ = 0;
+  std::optional<Estimate> last_output_;            // before smoothing
+  PlanarPose not_yet_shown_ = PlanarPose::Zero();  // output minus estimate
   double height_ = 0.0;
   int height_from_ = -1;
   std::int64_t height_ns_ = kNoStamp;
