@@ -110,6 +110,7 @@ Result<PointCloudView> PointCloudView::of(const PointCloud2& cloud, PointTimeUni
                        " rows of " + std::to_string(view.row_step_) + " bytes need " + std::to_string(needed));
     }
   }
+  if (points == 0) view.width_ = view.height_ = 0;  // 2^32 rows of nothing are nothing
   if (points > std::numeric_limits<std::uint32_t>::max()) return malformed("more than 2^32 points");
 
   const auto require = [&](std::string_view name, Field& to) -> Result<> {

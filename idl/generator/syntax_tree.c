@@ -71,7 +71,7 @@ enum node_kind node_kind_of(node any) {
     case IDL_LDOUBLE:
       return node_float128;
     case IDL_STRING:
-      return idl_is_bounded(any) ? node_bounded_string : node_string;
+      return !idl_is_literal(any) && idl_is_bounded(any) ? node_bounded_string : node_string;
     default:
       return node_other;
   }
