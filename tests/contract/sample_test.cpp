@@ -1,0 +1,189 @@
+// Samples as memory: they live as long as they are held, on any thread, and taking them neither blocks nor allocates.
+#include <atomic>
+#include <cstdlib>
+#include <thread>
+
+#include "tests/contract/contract.hpp"
+
+namespace {
+
+// Allocations of the calling thread while `counting` is set.
+thread_local bool counting = false;
+thread_local std::size_t allocations = 0;
+
+void* counted(std::size_t size, std::size_t alignment) {
+  if (counting) ++allocations;
+  const std::size_t rounded = (std::max<std::size_t>(size, 1) + alignment - 1) / alignment * alignment;
+  if (void* const memory = std::aligned_alloc(alignment, rounded)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return counted(size, alignof(std::max_align_t));
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return counted(size, static_cast<std::size_t>(alignment));
+}
+void* operator new(std::size_t size, std::align_val_t alignment, const std::nothrow_t&) noexcept {
+  return counted(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
+
+namespace adit::contract {
+namespace {
+
+class Samples : public Contract {};
+INSTANTIATE_TEST_SUITE_P(Pairs, Samples, testing::ValuesIn(all_pairs()), name_of);
+
+TEST_P(Samples, OutliveTheNextTakesTheReaderAndTheParticipants) {
+  std::vector<Sample> kept;
+  {
+    Link link(*this, GetParam(), Qos::reliable(100), Qos::reliable(100));
+    ASSERT_TRUE(link.reader && link.writer);
+    Collector collector(*link.reader);
+    for (unsigned n = 1; n <= 20; ++n) {
+      ASSERT_TRUE(link.writer->publish(Payload(70000, n)));
+      ASSERT_TRUE(collector.wait_for(n));
+    }
+    kept = std::move(collector.samples);
+    for (unsigned n = 1; n <= 20; ++n) EXPECT_TRUE(is_intact(kept[n - 1].bytes(), 70000)) << n;
+    kept.resize(10);
+  }
+  std::thread([&] {
+    for (unsigned n = 1; n <= 10; ++n) {
+      EXPECT_EQ(number_in(kept[n - 1].bytes()), n);
+      EXPECT_TRUE(is_intact(kept[n - 1].bytes(), 70000)) << n;
+    }
+    kept.clear();
+  }).join();
+}
+
+TEST_P(Samples, CanBeHeldUpToTheReadersDepth) {
+  constexpr unsigned depth = 10;
+  Link link(*this, GetParam(), Qos::reliable(depth), Qos::reliable(depth));
+  ASSERT_TRUE(link.reader && link.writer);
+  std::vector<Sample> held;
+  {
+    Collector collector(*link.reader);
+    for (unsigned n = 1; n <= depth; ++n) {
+      ASSERT_TRUE(link.writer->publish(Payload(200000, n)));
+      ASSERT_TRUE(collector.wait_for(n)) << n;
+    }
+    held = std::move(collector.samples);
+  }
+  for (unsigned n = 1; n <= depth; ++n) EXPECT_TRUE(is_intact(held[n - 1].bytes(), 200000)) << n;
+  held.clear();
+  Collector collector(*link.reader);
+  for (unsigned n = 1; n <= depth; ++n) {
+    ASSERT_TRUE(link.writer->publish(Payload(200000, 100 + n)));
+    ASSERT_TRUE(collector.wait_for(n)) << "after the held ones were given back: " << n;
+  }
+}
+
+TEST_P(Samples, KeepAliveHoldsTheBytesWithoutTheSample) {
+  Link link(*this, GetParam(), Qos::reliable(), Qos::reliable());
+  ASSERT_TRUE(link.reader && link.writer);
+  Collector collector(*link.reader);
+  ASSERT_TRUE(link.writer->publish(Payload(100000, 9)));
+  ASSERT_TRUE(collector.wait_for(1));
+  const Bytes bytes = collector.samples[0].bytes();
+  KeepAlive memory = collector.samples[0].memory();
+  KeepAlive second = memory;
+  collector.samples.clear();
+  memory = {};
+  for (unsigned n = 1; n <= 20; ++n) {
+    ASSERT_TRUE(link.writer->publish(Payload(100000, 100 + n)));
+    ASSERT_TRUE(collector.wait_for(1));
+    collector.samples.clear();
+  }
+  EXPECT_TRUE(is_intact(bytes, 100000));
+  EXPECT_EQ(number_in(bytes), 9u);
+}
+
+TEST_P(Samples, TakeOfNothingReturnsAtOnce) {
+  Link link(*this, GetParam(), Qos::reliable(), Qos::reliable());
+  ASSERT_TRUE(link.reader && link.writer);
+  Sample sample[4];
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(link.reader->take(sample), 0u);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, 1s);
+  EXPECT_EQ(link.reader->take({}), 0u);
+}
+
+TEST_P(Samples, NotificationFollowsItsRules) {
+  Link link(*this, GetParam(), Qos::reliable(), Qos::reliable());
+  ASSERT_TRUE(link.reader && link.writer);
+  std::atomic<int> first = 0;
+  std::atomic<int> second = 0;
+  link.reader->on_data([&] { ++first; });
+  ASSERT_TRUE(link.writer->publish(Payload(64, 1)));
+  ASSERT_TRUE(wait_until([&] { return first > 0; }));
+  const int before = first;
+  link.reader->on_data([&] { ++second; });
+  EXPECT_GT(second, 0) << "a sample is waiting: the new one is called at once";
+  ASSERT_TRUE(link.writer->publish(Payload(64, 2)));
+  Sample samples[2];
+  std::size_t taken = 0;
+  ASSERT_TRUE(wait_until([&] { return (taken += link.reader->take(samples)) == 2; }));
+  EXPECT_EQ(first, before);
+  link.reader->on_data(nullptr);
+  const int after = second;
+  ASSERT_TRUE(link.writer->publish(Payload(64, 3)));
+  ASSERT_TRUE(wait_until([&] { return link.reader->take(samples) == 1; }));
+  EXPECT_EQ(second, after);
+}
+
+// The vendors' C++ side counts too: Fast DDS allocates with operator new, Cyclone with malloc (not counted).
+TEST_P(Samples, PublishAndTakeDoNotAllocateOnceWarm) {
+  for (const std::size_t size : {std::size_t{1024}, std::size_t{1} << 20}) {
+    Link link(*this, GetParam(), Qos::reliable(), Qos::reliable());
+    ASSERT_TRUE(link.reader && link.writer);
+    std::size_t in_publish = 0;
+    std::size_t in_take = 0;
+    constexpr unsigned warm = 30;
+    constexpr unsigned measured = 50;
+    for (unsigned n = 1; n <= warm + measured; ++n) {
+      const Payload message(size, n);
+      allocations = 0;
+      counting = n > warm;
+      const bool sent = static_cast<bool>(link.writer->publish(message));
+      counting = false;
+      in_publish += allocations;
+      ASSERT_TRUE(sent);
+      Sample sample[1];
+      std::size_t taken = 0;
+      ASSERT_TRUE(wait_until([&] {
+        allocations = 0;
+        counting = n > warm;
+        taken = link.reader->take(sample);
+        counting = false;
+        in_take += allocations;
+        return taken == 1;
+      }));
+      allocations = 0;
+      counting = n > warm;
+      sample[0].reset();
+      counting = false;
+      in_take += allocations;
+    }
+    RecordProperty("allocations_per_publish_" + std::to_string(size), static_cast<int>(in_publish / measured));
+    EXPECT_EQ(in_publish, 0u) << measured << " messages of " << size << " bytes";
+    EXPECT_EQ(in_take, 0u) << measured << " messages of " << size << " bytes";
+  }
+}
+
+}  // namespace
+}  // namespace adit::contract
