@@ -19,7 +19,10 @@ struct SampleCache::HistoryCache : dds_rhc {
     return true;  // never refuse: Cyclone would repeat the delivery and block the other readers of this thread
   }
   static void unregister(ddsi_rhc* rhc, const ddsi_writer_info* writer) { of(rhc).forget(writer->iid); }
-  static void free(ddsi_rhc* rhc) { delete static_cast<HistoryCache*>(reinterpret_cast<dds_rhc*>(rhc)); }
+  static void free(ddsi_rhc* rhc) {
+    of(rhc).deadline_.reset();  // its thread belongs to the domain, which may end before the cache does
+    delete static_cast<HistoryCache*>(reinterpret_cast<dds_rhc*>(rhc));
+  }
 };
 
 namespace {
@@ -79,12 +82,17 @@ dds_rhc* SampleCache::make_history_cache(std::shared_ptr<SampleCache> cache) {
   return rhc;
 }
 
+void SampleCache::watch_deadline(const ddsi_domaingv* domain, Duration period, std::function<void()> missed) {
+  deadline_ = std::make_unique<DeadlineTimer>(domain, period, mutex_, std::move(missed));
+}
+
 void SampleCache::store(const ddsi_writer_info& writer, RawSample* sample) {
   std::uint64_t lost = 0;
   bool notify = false;
   {
     const std::lock_guard lock(mutex_);
     lost = count_gap(writer, sample->sequence);
+    if (deadline_) deadline_->restart();
     if (!sample->is_plain_cdr()) {
       ++stats_.rejected;
     } else {
@@ -119,6 +127,7 @@ std::uint64_t SampleCache::count_gap(const ddsi_writer_info& writer, std::uint64
 void SampleCache::forget(std::uint64_t writer_handle) {
   const std::lock_guard lock(mutex_);
   std::erase_if(writers_, [&](const WriterProgress& progress) { return progress.handle == writer_handle; });
+  if (deadline_ && writers_.empty()) deadline_->pause();
 }
 
 void SampleCache::push(const Entry& entry) {

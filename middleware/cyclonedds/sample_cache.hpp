@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "middleware/cyclonedds/deadline_timer.hpp"
 #include "middleware/cyclonedds/raw_type.hpp"
 #include "middleware/graph.hpp"
 #include "middleware/participant.hpp"
@@ -34,6 +35,9 @@ class SampleCache {
   void on_data(Reader::Notify notify);
   // received, received_bytes, lost, overwritten, rejected.
   LinkStats stats() const;
+
+  // Calls `missed` on a Cyclone thread for every `period` without a sample, from the first sample on.
+  void watch_deadline(const ddsi_domaingv* domain, Duration period, std::function<void()> missed);
 
   // What dds_create_reader_rhc wants; it shares the ownership of `cache` until Cyclone frees it.
   static dds_rhc* make_history_cache(std::shared_ptr<SampleCache> cache);
@@ -66,6 +70,7 @@ class SampleCache {
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   std::vector<WriterProgress> writers_;
+  std::unique_ptr<DeadlineTimer> deadline_;  // null: no deadline
   LinkStats stats_;
 
   std::mutex notify_mutex_;  // held while notify_ runs, so that on_data can promise it is not running
