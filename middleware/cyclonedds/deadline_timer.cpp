@@ -1,56 +1,46 @@
 #include "middleware/cyclonedds/deadline_timer.hpp"
 
-#include <dds/ddsrt/time.h>
-
-#include <cassert>
-#include <cstddef>
-
 namespace adit::cyclonedds {
 
-DeadlineTimer::DeadlineTimer(const ddsi_domaingv* domain, Duration period, std::mutex& mutex,
-                             std::function<void()> missed)
-    : mutex_(mutex), missed_(std::move(missed)) {
-  administration_.owner = this;
-  deadline_init(domain, &administration_.timer, offsetof(Administration, timer), offsetof(Administration, instance),
-                &DeadlineTimer::on_timer);
-  administration_.timer.dur = period.count();
-}
+DeadlineTimer::DeadlineTimer(Duration period, std::function<void()> missed)
+    : period_(period), missed_(std::move(missed)), thread_([this] { run(); }) {}
 
 DeadlineTimer::~DeadlineTimer() {
-  deadline_stop(&administration_.timer);
-  deadline_clear(&administration_.timer);
-  deadline_fini(&administration_.timer);
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
 }
 
+// A running timer is not woken: it finds the new time when the old one has come.
 void DeadlineTimer::restart() {
-  if (running_) {
-    deadline_renew_instance_locked(&administration_.timer, &administration_.instance);
-  } else {
-    deadline_register_instance_locked(&administration_.timer, &administration_.instance, ddsrt_time_monotonic());
-    running_ = true;
-  }
+  const std::lock_guard lock(mutex_);
+  const bool was_paused = !due_;
+  due_ = Clock::now() + period_;
+  if (was_paused) changed_.notify_one();
 }
 
 void DeadlineTimer::pause() {
-  if (!running_) return;
-  deadline_unregister_instance_locked(&administration_.timer, &administration_.instance);
-  running_ = false;
+  const std::lock_guard lock(mutex_);
+  due_.reset();
 }
 
-ddsrt_mtime_t DeadlineTimer::on_timer(void* administration, ddsrt_mtime_t now) {
-  DeadlineTimer& self = *static_cast<Administration*>(administration)->owner;
-  std::unique_lock lock(self.mutex_);
-  void* instance = nullptr;
-  ddsrt_mtime_t next = deadline_next_missed_locked(&self.administration_.timer, now, &instance);
-  while (next.v == 0) {  // an instance missed its deadline
-    deadline_reregister_instance_locked(&self.administration_.timer, &self.administration_.instance, now);
-    lock.unlock();
-    self.missed_();
-    lock.lock();
-    now = ddsrt_time_monotonic();
-    next = deadline_next_missed_locked(&self.administration_.timer, now, &instance);
+void DeadlineTimer::run() {
+  std::unique_lock lock(mutex_);
+  while (!stop_) {
+    if (!due_) {
+      changed_.wait(lock, [this] { return stop_ || due_; });
+    } else if (const auto due = *due_; Clock::now() < due) {
+      changed_.wait_until(lock, due, [this] { return stop_; });
+    } else {
+      *due_ += period_;
+      lock.unlock();
+      missed_();
+      lock.lock();
+    }
   }
-  return next;
 }
 
 }  // namespace adit::cyclonedds

@@ -1,10 +1,12 @@
-// Tells when a reader with a deadline got nothing for that long: Cyclone's own deadline timer, for one instance.
+// Tells when a reader with a deadline got nothing for that long. A thread of its own, because Cyclone's timers are in
+// headers that do not compile as C++; only readers with a deadline have one.
 #pragma once
 
-#include <dds/ddsi/ddsi_deadline.h>
-
+#include <condition_variable>
 #include <functional>
 #include <mutex>
+#include <optional>
+#include <thread>
 
 #include "middleware/time.hpp"
 
@@ -12,31 +14,29 @@ namespace adit::cyclonedds {
 
 class DeadlineTimer {
  public:
-  // `missed` is called on Cyclone's timer thread, without `mutex`, once per period in which nothing was seen.
-  DeadlineTimer(const ddsi_domaingv* domain, Duration period, std::mutex& mutex, std::function<void()> missed);
-  // Waits for a running `missed`; call it without the mutex.
+  // `missed` is called on the timer's thread, once per period in which nothing was seen.
+  DeadlineTimer(Duration period, std::function<void()> missed);
+  // Waits for a running `missed`.
   ~DeadlineTimer();
   DeadlineTimer(const DeadlineTimer&) = delete;
   DeadlineTimer& operator=(const DeadlineTimer&) = delete;
 
-  // A sample arrived: the period starts anew (the first one starts the timer). With the mutex held.
+  // A sample arrived: the period starts anew. The first one starts the timer.
   void restart();
-  // Nobody writes any more. With the mutex held.
+  // Nobody writes any more.
   void pause();
 
  private:
-  // What Cyclone's timer administration points into.
-  struct Administration {
-    deadline_adm timer;
-    deadline_elem instance;
-    DeadlineTimer* owner;
-  };
-  static ddsrt_mtime_t on_timer(void* administration, ddsrt_mtime_t now);
+  using Clock = std::chrono::steady_clock;
+  void run();
 
-  std::mutex& mutex_;
+  const Duration period_;
   const std::function<void()> missed_;
-  Administration administration_{};
-  bool running_ = false;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<Clock::time_point> due_;  // none: paused
+  bool stop_ = false;
+  std::thread thread_;
 };
 
 }  // namespace adit::cyclonedds

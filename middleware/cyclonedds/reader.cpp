@@ -25,10 +25,7 @@ class CycloneReader final : public Reader {
     const ddsi_sertype* type = nullptr;
     auto topic = state_.open_topic(config_, type);
     if (!topic) return topic.error();
-    if (config_.qos.deadline) {
-      const auto* const domain = static_cast<const ddsi_domaingv*>(ddsrt_atomic_ldvoidp(&type->gv));
-      cache_->watch_deadline(domain, *config_.qos.deadline, [this] { watch_.deadline_missed(gid_); });
-    }
+    if (config_.qos.deadline) cache_->watch_deadline(*config_.qos.deadline, [this] { watch_.deadline_missed(gid_); });
     const auto listener = watch_.make_listener();
     const QosPointer qos = reader_qos(config_);
     dds_rhc* const history = SampleCache::make_history_cache(cache_);

@@ -19,10 +19,7 @@ struct SampleCache::HistoryCache : dds_rhc {
     return true;  // never refuse: Cyclone would repeat the delivery and block the other readers of this thread
   }
   static void unregister(ddsi_rhc* rhc, const ddsi_writer_info* writer) { of(rhc).forget(writer->iid); }
-  static void free(ddsi_rhc* rhc) {
-    of(rhc).deadline_.reset();  // its thread belongs to the domain, which may end before the cache does
-    delete static_cast<HistoryCache*>(reinterpret_cast<dds_rhc*>(rhc));
-  }
+  static void free(ddsi_rhc* rhc) { delete static_cast<HistoryCache*>(reinterpret_cast<dds_rhc*>(rhc)); }
 };
 
 namespace {
@@ -82,8 +79,8 @@ dds_rhc* SampleCache::make_history_cache(std::shared_ptr<SampleCache> cache) {
   return rhc;
 }
 
-void SampleCache::watch_deadline(const ddsi_domaingv* domain, Duration period, std::function<void()> missed) {
-  deadline_ = std::make_unique<DeadlineTimer>(domain, period, mutex_, std::move(missed));
+void SampleCache::watch_deadline(Duration period, std::function<void()> missed) {
+  deadline_ = std::make_unique<DeadlineTimer>(period, std::move(missed));
 }
 
 void SampleCache::store(const ddsi_writer_info& writer, RawSample* sample) {

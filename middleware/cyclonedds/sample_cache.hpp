@@ -36,8 +36,8 @@ class SampleCache {
   // received, received_bytes, lost, overwritten, rejected.
   LinkStats stats() const;
 
-  // Calls `missed` on a Cyclone thread for every `period` without a sample, from the first sample on.
-  void watch_deadline(const ddsi_domaingv* domain, Duration period, std::function<void()> missed);
+  // Calls `missed` for every `period` without a sample, from the first sample on. Before the reader exists.
+  void watch_deadline(Duration period, std::function<void()> missed);
 
   // What dds_create_reader_rhc wants; it shares the ownership of `cache` until Cyclone frees it.
   static dds_rhc* make_history_cache(std::shared_ptr<SampleCache> cache);

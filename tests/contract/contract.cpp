@@ -10,6 +10,10 @@
 
 namespace adit::contract {
 
+std::ostream& operator<<(std::ostream& out, const Pair& pair) {
+  return out << pair.writer << " to " << pair.reader;
+}
+
 std::string name_of(const testing::TestParamInfo<Pair>& info) {
   return info.param.writer + "_to_" + info.param.reader;
 }

@@ -17,6 +17,7 @@ struct Pair {
   std::string writer;
   std::string reader;
 };
+std::ostream& operator<<(std::ostream& out, const Pair& pair);
 std::string name_of(const testing::TestParamInfo<Pair>& info);
 // Every ordered pair of the vendors of this build.
 std::vector<Pair> all_pairs();
