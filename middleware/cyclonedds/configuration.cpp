@@ -127,10 +127,11 @@ Result<Configuration> make_configuration(const ParticipantConfig& config) {
       << "<ParticipantIndex>auto</ParticipantIndex>"
       << "<MaxAutoParticipantIndex>" << result.last_participant_index << "</MaxAutoParticipantIndex><Peers>";
   for (const std::string& peer : result.peers) xml << "<Peer address=\"" << peer << "\"/>";
+  // GenerateKeyhash: Fast DDS sees that one of our endpoints is gone by the key hash only.
   xml << "</Peers></Discovery><Internal>"
       << "<SocketReceiveBufferSize min=\"" << result.receive_buffer << "B\" max=\"" << result.receive_buffer << "B\"/>"
       << "<SocketSendBufferSize min=\"" << result.send_buffer << "B\" max=\"" << result.send_buffer << "B\"/>"
-      << "</Internal></Domain>";
+      << "<GenerateKeyhash>true</GenerateKeyhash></Internal></Domain>";
   result.xml = xml.str();
   return result;
 }

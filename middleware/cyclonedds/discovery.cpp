@@ -32,9 +32,13 @@ void for_each_alive(dds_entity_t reader, Visit visit) {
   }
 }
 
+bool is_cyclone(const Gid& gid) {
+  return gid.bytes[0] == 0x01 && gid.bytes[1] == 0x10;
+}
+
 std::string vendor_name(const Gid& gid) {
   if (gid.bytes[0] == 0x01 && gid.bytes[1] == 0x0f) return "Fast DDS";
-  if (gid.bytes[0] == 0x01 && gid.bytes[1] == 0x10) return "Cyclone DDS";
+  if (is_cyclone(gid)) return "Cyclone DDS";
   char text[24];
   std::snprintf(text, sizeof text, "vendor %02x.%02x", gid.bytes[0], gid.bytes[1]);
   return text;
@@ -47,6 +51,11 @@ EndpointInfo describe(const dds_builtintopic_endpoint_t& endpoint, bool is_write
   info.dds_topic = info.topic = endpoint.topic_name;
   info.dds_type = info.type = endpoint.type_name;
   info.qos = from_dds(endpoint.qos, info.history_known);
+  // Cyclone announces its history and leaves out the default; others that show the default announced nothing.
+  if (info.history_known && !is_cyclone(info.gid) && info.qos.depth == 1) {
+    info.history_known = false;
+    info.qos.depth = 0;
+  }
   info.type_hash = user_data_value(user_data(endpoint.qos), "typehash");
   return info;
 }
