@@ -132,8 +132,10 @@ Result<PointCloudView> PointCloudView::of(const PointCloud2& cloud, PointTimeUni
   auto time = view.find({"t", "time", "timestamp", "offset_time", "time_offset", "time_stamp", "point_time_offset"});
   if (!time) return time.error();
   view.time_ = *time;
+  if (time_unit == PointTimeUnit::unused) view.time_.reset();
   if (view.time_) {
-    view.find_time_scale(time_unit, cloud.header.stamp.sec + 1e-9 * cloud.header.stamp.nanosec);
+    const double stamp = cloud.header.stamp.sec + 1e-9 * cloud.header.stamp.nanosec;
+    if (auto found = view.find_time_scale(time_unit, stamp); !found) return found.error();
   }
   return view;
 }
@@ -185,9 +187,11 @@ double PointCloudView::time(std::size_t index) const {
   return (value(*time_, index) - time_origin_) * time_scale_;
 }
 
-void PointCloudView::find_time_scale(PointTimeUnit unit, double stamp) {
+Result<> PointCloudView::find_time_scale(PointTimeUnit unit, double stamp) {
   constexpr std::size_t looked_at = 64;
-  constexpr double longest_scan = 5.0;
+  constexpr double longest_scan = 5.0;       // s
+  constexpr double clock_difference = 60.0;  // s
+  constexpr double float32_limit = 16384.0;  // s: beyond, float32 has steps of 2 ms
   double largest = 0.0;
   const std::size_t stride = std::max<std::size_t>(1, size() / looked_at);
   for (std::size_t i = 0; i < size(); i += stride) {
@@ -209,6 +213,7 @@ void PointCloudView::find_time_scale(PointTimeUnit unit, double stamp) {
     }
   }
   switch (unit) {
+    case PointTimeUnit::unused:
     case PointTimeUnit::automatic:
     case PointTimeUnit::seconds:
       time_scale_ = 1.0;
@@ -224,7 +229,16 @@ void PointCloudView::find_time_scale(PointTimeUnit unit, double stamp) {
       break;
   }
   absolute = absolute || largest * time_scale_ >= 1e8;
-  if (absolute) time_origin_ = stamp / time_scale_;
+  if (absolute) {
+    const double latest = largest * time_scale_;
+    const bool too_coarse = time_->datatype == PointField::FLOAT32 && latest > float32_limit;
+    if (too_coarse || std::abs(latest - stamp) > clock_difference) {
+      return malformed("point times up to " + std::to_string(largest) + " are neither offsets within a scan nor near " +
+                       "the stamp " + std::to_string(stamp) + ": name their unit, or leave them unused");
+    }
+    time_origin_ = stamp / time_scale_;
+  }
+  return {};
 }
 
 template <class T>
@@ -257,6 +271,7 @@ void PointCloudView::copy_to(PointColumns& out, NonFinitePoints non_finite) cons
   std::size_t kept = 0;
   for (std::size_t i = 0; i < size(); ++i) {
     if (!std::isfinite(out.x[i]) || !std::isfinite(out.y[i]) || !std::isfinite(out.z[i])) continue;
+    if (!out.time.empty() && !std::isfinite(out.time[i])) continue;
     if (kept != i) {
       const auto move = [&](auto& column) {
         if (!column.empty()) column[kept] = column[i];

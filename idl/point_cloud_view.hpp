@@ -18,7 +18,7 @@ struct PointField;
 
 namespace adit {
 
-enum class PointTimeUnit { automatic, seconds, milliseconds, microseconds, nanoseconds };
+enum class PointTimeUnit { automatic, seconds, milliseconds, microseconds, nanoseconds, unused };
 
 // The points of a cloud as separate arrays, all of one length; an array is empty when the cloud has no such field.
 struct PointColumns {
@@ -43,7 +43,8 @@ enum class NonFinitePoints { drop, keep };
 // Unit of the time field, unless given: a value too large for an offset within a scan is a time since the epoch, whose
 // unit its magnitude tells (1e8 s, 1e11 ms, 1e14 us, 1e17 ns and above); it becomes relative to the header's stamp.
 // Otherwise integers are nanoseconds since the stamp; floating-point values are seconds, since the stamp up to 5,
-// since zero of the clock beyond. Other conventions (offsets as float microseconds) must be named by the caller.
+// since zero of the clock beyond. A time that is then not within a minute of the stamp is refused: other conventions
+// (offsets as float microseconds, a sensor's own clock) must be named by the caller, or the field left unused.
 class PointCloudView {
  public:
   // Refuses a cloud whose fields, steps and data do not fit together; the message says what does not.
@@ -63,7 +64,7 @@ class PointCloudView {
   std::uint16_t ring(std::size_t index) const;
   double time(std::size_t index) const;
 
-  // All points, or those whose x, y and z are finite. Reuses the memory of `out`.
+  // All points, or those whose x, y, z and time are finite. Reuses the memory of `out`.
   void copy_to(PointColumns& out, NonFinitePoints non_finite = NonFinitePoints::drop) const;
 
   // Any other field. Empty when the cloud has none of that name.
@@ -80,7 +81,7 @@ class PointCloudView {
   const std::uint8_t* point(std::size_t index) const {
     return data_ + (index / width_) * row_step_ + (index % width_) * point_step_;
   }
-  void find_time_scale(PointTimeUnit unit, double stamp);
+  Result<> find_time_scale(PointTimeUnit unit, double stamp);
   template <class T>
   void copy_column(const Field& field, std::vector<T>& out) const;
 

@@ -144,6 +144,26 @@ TEST(PointCloudView, SimulatedClockSecondsAreAbsolute) {
   EXPECT_NEAR(columns_of(maker.cloud).time[1], 0.1, 1e-9);
 }
 
+TEST(PointCloudView, TimesOfUnknownMeaningAreRefused) {
+  CloudMaker maker = two_points();
+  maker.cloud.header.stamp.sec = 1700000000;
+  maker.field<float>("time", 16, PointField::FLOAT32, {0.0f, 99.0f});  // ms? s of another clock?
+  const auto view = PointCloudView::of(maker.cloud);
+  ASSERT_FALSE(view);
+  EXPECT_THAT(view.error().message, HasSubstr("name their unit"));
+  EXPECT_TRUE(PointCloudView::of(maker.cloud, PointTimeUnit::milliseconds));
+  const auto without = PointCloudView::of(maker.cloud, PointTimeUnit::unused);
+  ASSERT_TRUE(without);
+  EXPECT_FALSE(without->has_time());
+}
+
+TEST(PointCloudView, AbsoluteTimeInFloat32IsTooCoarse) {
+  CloudMaker maker = two_points();
+  maker.cloud.header.stamp.sec = 1700000000;
+  maker.field<float>("timestamp", 16, PointField::FLOAT32, {1.7e9f, 1.7e9f});
+  EXPECT_FALSE(PointCloudView::of(maker.cloud));
+}
+
 TEST(PointCloudView, NonFinitePointsAreDroppedOrKept) {
   CloudMaker maker(3, 1, 16);
   maker.field<float>("x", 0, PointField::FLOAT32, {nan, 2.0f, 3.0f});
