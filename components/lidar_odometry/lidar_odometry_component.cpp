@@ -1,0 +1,215 @@
+#include <algorithm>
+#include <deque>
+
+#include "components/geometry/trajectory.hpp"
+#include "components/lidar_odometry/config.hpp"
+#include "components/lidar_odometry/lidar_odometry.hpp"
+#include "components/runtime/component.hpp"
+#include "components/runtime/stamp.hpp"
+#include "idl/point_cloud_view.hpp"
+#include "nav_msgs/msg/odometry.hpp"
+#include "sensor_msgs/msg/point_cloud2.hpp"
+
+namespace adit {
+namespace {
+
+using lidar_odometry::Mode;
+using nav_msgs::msg::Odometry;
+using sensor_msgs::msg::PointCloud2;
+
+class LidarOdometryComponent final : public Component {
+  using CloudPointer = std::shared_ptr<const PointCloud2>;
+
+  Param<Mode> mode_{*this, "mode", Mode::kiss,
+                    Choices<Mode>{{"kiss", Mode::kiss}, {"genz", Mode::genz}, {"default", Mode::default_}},
+                    "algorithm"};
+  Param<double> min_range_{*this, "min_range", 0.5, Unit::metre, Range{0.0, 100.0}, "nearer points are dropped"};
+  Param<double> max_range_{*this, "max_range", 100.0, Unit::metre, Range{1.0, 500.0}, "farther points are dropped"};
+  Param<double> voxel_size_{*this,       "voxel_size",     0.0,
+                            Unit::metre, Range{0.0, 10.0}, "of the local map; 0: the mode's default"};
+  Param<bool> deskew_{*this, "deskew", true, "compensate the motion within the sweep"};
+  Param<std::int64_t> threads_{*this, "threads", 1, Range{1.0, 16.0}, "the result does not depend on it"};
+  Param<std::string> odom_frame_{*this, "odom_frame", std::string("odom"), "frame of the published poses"};
+  Param<bool> use_prior_{*this, "use_prior", false,
+                         "wait for `prior` odometry of the sensor and start the registration from it"};
+  Param<double> prior_timeout_{
+      *this,        "prior_timeout",   1.0,
+      Unit::second, Range{0.01, 60.0}, "a cloud waits this long for its prior, then goes without"};
+
+  Output<Odometry> odometry_{*this, "odometry", Qos::reliable(10)};
+  Input<PointCloud2> points_{*this, "points", Qos::sensor(), Queue{2, WhenFull::drop_oldest},
+                             [this](CloudPointer cloud, const MessageInfo&) { on_cloud(std::move(cloud)); }};
+  Input<Odometry> prior_{*this, "prior", Qos::reliable(100), Queue{100, WhenFull::drop_oldest},
+                         [this](const Odometry& message, const MessageInfo&) { on_prior(message); }};
+  Timer overdue_{*this, "overdue", std::chrono::milliseconds(100), [this] { process_waiting(); }};
+
+  // A cloud that waits for the prior of its instant.
+  struct Waiting {
+    CloudPointer cloud;
+    std::chrono::steady_clock::time_point until;
+  };
+  static constexpr std::size_t max_waiting = 8;
+  static constexpr std::size_t max_priors = 1000;
+
+  std::optional<lidar_odometry::LidarOdometry> engine_;
+  std::vector<lidar_odometry::Point3f> points_buffer_;
+  std::vector<float> seconds_buffer_;
+  std::vector<std::uint16_t> rings_buffer_;
+  std::deque<Waiting> waiting_;
+  Trajectory priors_;
+  std::optional<Pose> prior_at_last_;  // prior's pose at the instant of the last estimate
+  std::uint64_t refused_ = 0;
+  std::uint64_t without_prior_ = 0;
+
+  Result<void> configure() override;
+  Result<void> activate() override;
+  void on_time_jump(Duration) override;
+  void on_cloud(CloudPointer cloud);
+  void on_prior(const Odometry& message);
+  void process_waiting();
+  Result<lidar_odometry::Cloud> view(const PointCloud2& message);
+  void process(const PointCloud2& message);
+  void publish(const lidar_odometry::Estimate& estimate, const std::string& frame_id);
+  void report(const lidar_odometry::Estimate& estimate);
+};
+
+Result<void> LidarOdometryComponent::configure() {
+  lidar_odometry::Config config;
+  config.mode = mode_;
+  config.min_range = min_range_;
+  config.max_range = max_range_;
+  config.deskew = deskew_;
+  config.threads = static_cast<int>(threads_.value());
+  if (voxel_size_ > 0.0) config.kiss.voxel_size = config.genz.voxel_size = voxel_size_;
+  if (Result<void> valid = lidar_odometry::check(config); !valid) return valid;
+  engine_.emplace(config);
+  return {};
+}
+
+Result<void> LidarOdometryComponent::activate() {
+  on_time_jump({});
+  refused_ = without_prior_ = 0;
+  return {};
+}
+
+void LidarOdometryComponent::on_time_jump(Duration) {
+  engine_->reset();
+  waiting_.clear();
+  priors_.clear();
+  prior_at_last_.reset();
+}
+
+void LidarOdometryComponent::on_cloud(CloudPointer cloud) {
+  if (!use_prior_) return process(*cloud);
+  const auto timeout =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(prior_timeout_.value()));
+  if (waiting_.size() == max_waiting) {
+    process(*waiting_.front().cloud);
+    waiting_.pop_front();
+  }
+  waiting_.push_back({std::move(cloud), std::chrono::steady_clock::now() + timeout});
+  process_waiting();
+}
+
+void LidarOdometryComponent::on_prior(const Odometry& message) {
+  const auto& p = message.pose.pose.position;
+  const auto& q = message.pose.pose.orientation;
+  const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
+  StampedPose pose;
+  pose.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
+  pose.pose.translation() = Eigen::Vector3d(p.x, p.y, p.z);
+  if (!pose.pose.translation().allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01)) return;
+  pose.pose.linear() = rotation.normalized().toRotationMatrix();
+  if (!priors_.empty() && pose.stamp_ns <= priors_.back().stamp_ns) return;
+  if (priors_.size() == max_priors) priors_.erase(priors_.begin(), priors_.begin() + max_priors / 2);
+  priors_.push_back(pose);
+  process_waiting();
+}
+
+void LidarOdometryComponent::process_waiting() {
+  while (!waiting_.empty()) {
+    const std::int64_t stamp = to_time(waiting_.front().cloud->header.stamp).time_since_epoch().count();
+    const bool known = !priors_.empty() && priors_.back().stamp_ns >= stamp;
+    if (!known && std::chrono::steady_clock::now() < waiting_.front().until) return;
+    const CloudPointer cloud = std::move(waiting_.front().cloud);
+    waiting_.pop_front();
+    process(*cloud);
+  }
+}
+
+Result<lidar_odometry::Cloud> LidarOdometryComponent::view(const PointCloud2& message) {
+  const Result<PointCloudView> points = PointCloudView::of(message);
+  if (!points) return points.error();
+  points_buffer_.resize(points->size());
+  seconds_buffer_.resize(points->has_time() ? points->size() : 0);
+  rings_buffer_.resize(points->has_ring() ? points->size() : 0);
+  for (std::size_t i = 0; i < points->size(); ++i) {
+    const std::array<float, 3> p = points->position(i);
+    points_buffer_[i] = {p[0], p[1], p[2]};
+  }
+  for (std::size_t i = 0; i < seconds_buffer_.size(); ++i) seconds_buffer_[i] = static_cast<float>(points->time(i));
+  for (std::size_t i = 0; i < rings_buffer_.size(); ++i) rings_buffer_[i] = points->ring(i);
+  lidar_odometry::Cloud cloud;
+  cloud.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
+  cloud.points = std::span<const lidar_odometry::Point3f>(points_buffer_);
+  cloud.seconds = std::span<const float>(seconds_buffer_);
+  cloud.rings = std::span<const std::uint16_t>(rings_buffer_);
+  cloud.width = points->width();
+  cloud.height = points->height();
+  return cloud;
+}
+
+void LidarOdometryComponent::process(const PointCloud2& message) {
+  const Result<lidar_odometry::Cloud> cloud = view(message);
+  if (!cloud) {
+    health(Health::warn, std::to_string(++refused_) + " clouds refused: " + cloud.error().message);
+    return;
+  }
+  const std::optional<Pose> now = interpolate(priors_, engine_->reference_stamp_ns(*cloud));
+  lidar_odometry::Prior prior;
+  if (now && prior_at_last_) prior.pose = prior_at_last_->inverse() * *now;
+  const bool has_prior = now && prior_at_last_;
+  if (use_prior_ && !has_prior) ++without_prior_;
+  const lidar_odometry::Estimate& estimate = engine_->process(*cloud, has_prior ? &prior : nullptr);
+  if (estimate.status != lidar_odometry::Status::bad_stamp) prior_at_last_ = now;
+  report(estimate);
+  if (estimate.status == lidar_odometry::Status::initialising || registered(estimate.status)) {
+    publish(estimate, message.header.frame_id);
+  }
+}
+
+void LidarOdometryComponent::publish(const lidar_odometry::Estimate& estimate, const std::string& frame_id) {
+  Loan<Odometry> message = odometry_.loan();
+  message->header.stamp = to_stamp(Time(Duration(estimate.stamp_ns)));
+  message->header.frame_id = odom_frame_.value();
+  message->child_frame_id = frame_id;
+  const Eigen::Quaterniond q(estimate.pose.linear());
+  const Eigen::Vector3d t = estimate.pose.translation();
+  message->pose.pose.position = {t.x(), t.y(), t.z()};
+  message->pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
+  const Matrix6d covariance = covariance_in_parent_axes(estimate.pose, estimate.covariance);
+  std::copy_n(covariance.data(), covariance.size(), message->pose.covariance.begin());  // symmetric: order is free
+  const Vector6d& v = estimate.twist;
+  message->twist.twist.linear = {v[0], v[1], v[2]};
+  message->twist.twist.angular = {v[3], v[4], v[5]};
+  message->twist.covariance.fill(0.0);
+  odometry_.publish(std::move(message));
+}
+
+void LidarOdometryComponent::report(const lidar_odometry::Estimate& estimate) {
+  const lidar_odometry::TotalCounters& total = estimate.total;
+  const bool fine =
+      estimate.status == lidar_odometry::Status::ok || estimate.status == lidar_odometry::Status::initialising;
+  std::string reason = std::string(to_string(estimate.status)) + ": " + std::to_string(total.registered) + " of " +
+                       std::to_string(total.clouds) + " clouds registered";
+  if (total.degenerate > 0) reason += ", " + std::to_string(total.degenerate) + " degenerate";
+  if (total.refused + refused_ > 0) reason += ", " + std::to_string(total.refused + refused_) + " refused";
+  if (total.lost > 0) reason += ", " + std::to_string(total.lost) + " lost";
+  if (without_prior_ > 1) reason += ", " + std::to_string(without_prior_ - 1) + " without their prior";
+  health(fine ? Health::ok : Health::warn, std::move(reason));
+}
+
+ADIT_COMPONENT(LidarOdometryComponent, "lidar_odometry");
+
+}  // namespace
+}  // namespace adit
