@@ -46,11 +46,14 @@ Result<ProcessStatus> read_process_status(const std::string& path) {
   const nlohmann::json json = nlohmann::json::parse(file, nullptr, false);
   if (!json.is_object()) return Error{ErrorCode::not_found, path + ": no status"};
   ProcessStatus status;
-  for (const auto& [topic, link] : json.value("links", nlohmann::json::object()).items()) {
-    status.links[topic] = {link.at(0), link.at(1), link.at(2), link.at(3)};
+  if (json.contains("links")) {
+    for (const auto& [topic, link] : json["links"].items()) {
+      status.links[topic] = {link.at(0), link.at(1), link.at(2), link.at(3)};
+    }
   }
-  for (const auto& [component, cpu_s] : json.value("cpu_s", nlohmann::json::object()).items())
-    status.cpu_s[component] = cpu_s;
+  if (json.contains("cpu_s")) {
+    for (const auto& [component, cpu_s] : json["cpu_s"].items()) status.cpu_s[component] = cpu_s;
+  }
   return status;
 }
 

@@ -12,6 +12,7 @@
 #include "bringup/deployment/deployment.hpp"
 #include "bringup/supervisor/status_table.hpp"
 #include "bringup/supervisor/supervisor.hpp"
+#include "middleware/participant.hpp"
 
 namespace adit {
 namespace {

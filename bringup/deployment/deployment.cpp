@@ -1,5 +1,6 @@
 #include "bringup/deployment/deployment.hpp"
 
+#include <algorithm>
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
@@ -8,6 +9,8 @@
 #include <sstream>
 
 #include "components/config/yaml_reader.hpp"
+#include "components/runtime/component.hpp"
+#include "components/runtime/component_core.hpp"
 #include "middleware/ros/names.hpp"
 
 namespace adit {
@@ -26,7 +29,7 @@ Value to_value(const YamlValue& value, const std::string& where) {
         using T = std::decay_t<decltype(content)>;
         if constexpr (requires { typename T::allocator_type; } && !std::is_same_v<T, std::string>) {
           Value::List list;
-          for (const auto item : content) {
+          for (const auto& item : content) {
             list.emplace_back(static_cast<typename T::value_type>(item));
             list.back().where = where;
           }
@@ -58,6 +61,18 @@ void merge(Value::Map& into, const Value::Map& from) {
     std::erase_if(into, [&](const auto& entry) { return entry.first == key; });
     into.emplace_back(key, value);
   }
+}
+
+// What is said for all nodes concerns those that declare it, as in ROS 2; a type that does not exist is reported later.
+Value::Map declared_only(Value::Map parameters, const std::string& type) {
+  const Result<std::unique_ptr<Component>> component = components::create(type);
+  if (!component) return {};
+  const std::vector<ParamInfo> declared = (*component)->core().parameters();
+  std::erase_if(parameters, [&](const auto& entry) {
+    return std::none_of(declared.begin(), declared.end(),
+                        [&](const ParamInfo& info) { return info.name == entry.first; });
+  });
+  return parameters;
 }
 
 void read_middleware(const YamlSection& section, ParticipantConfig& config) {
@@ -137,7 +152,8 @@ ComponentConfig read_component(const YamlSection& section, const Common& common)
   Value::Map parameters;
   for (const std::string& node : {std::string("/**"), config.name, join_node_name(config.namespace_, config.name)}) {
     const auto found = common.parameters.find(node);
-    if (found != common.parameters.end()) merge(parameters, found->second);
+    if (found == common.parameters.end()) continue;
+    merge(parameters, node == "/**" ? declared_only(found->second, config.type) : found->second);
   }
   merge(parameters, parameter_map(section.section("parameters")));
   config.parameters = Value(std::move(parameters));

@@ -34,7 +34,7 @@ struct ChildStatus {
   Duration uptime{};
   double cpu_s = 0.0;         // user + system, all runs of this child
   std::size_t rss_bytes = 0;  // now
-  std::string report;         // what it last said of itself
+  HeartbeatReport report;     // what it last said of itself; number 0: nothing yet
   std::string last_end;       // "exit code 1", "killed by signal 9 (Killed)", "no heartbeat for 5 s"; empty: none yet
 };
 const char* to_string(ChildStatus::State state);

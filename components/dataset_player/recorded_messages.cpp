@@ -43,7 +43,9 @@ void fill(const dataset::PointFile& cloud, Time stamp, const std::string& frame_
 void fill(const dataset::Image16& image, Time stamp, const std::string& frame_id, std::uint32_t counter,
           adit_msgs::msg::ThermalFrame& out) {
   const float unknown = std::numeric_limits<float>::quiet_NaN();
-  out = adit_msgs::msg::ThermalFrame{.data = std::move(out.data)};
+  Blob pixels = std::move(out.data);
+  out = {};
+  out.data = std::move(pixels);
   out.header.stamp = to_stamp(stamp);
   out.header.frame_id = frame_id;
   out.height = image.height;

@@ -187,7 +187,7 @@ void LidarOdometryComponent::publish(const lidar_odometry::Estimate& estimate, c
   const Eigen::Vector3d t = estimate.pose.translation();
   message->pose.pose.position = {t.x(), t.y(), t.z()};
   message->pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
-  const Matrix6d covariance = covariance_in_parent_axes(estimate.pose, estimate.covariance);
+  const Matrix6d covariance = lidar_odometry::covariance_in_parent_axes(estimate.pose, estimate.covariance);
   std::copy_n(covariance.data(), covariance.size(), message->pose.covariance.begin());  // symmetric: order is free
   const Vector6d& v = estimate.twist;
   message->twist.twist.linear = {v[0], v[1], v[2]};

@@ -24,6 +24,10 @@ Logger& Component::log() {
   return core_->log();
 }
 
+void Component::finish() {
+  core_->finish();
+}
+
 void Component::health(Health level, std::string reason) {
   core_->set_health(level, std::move(reason));
 }

@@ -45,6 +45,10 @@ class Component {
   // Simulated time jumped back by -step: forget what was stamped later. Called while active.
   virtual void on_time_jump(Duration step) { static_cast<void>(step); }
 
+  // This component's work is over (a recording is played): its process ends as if it had been asked to stop, after the
+  // handler that calls this has returned. Nothing happens offline. Any thread.
+  void finish();
+
   const std::string& name() const;       // "lidar_odometry"
   const std::string& full_name() const;  // "/perception/lidar_odometry"
   const Clock& clock() const;

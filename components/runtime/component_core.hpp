@@ -30,6 +30,7 @@ struct Environment {
   // the simulated clock.
   bool offline = false;
   std::function<void(ComponentCore&, const std::string& reason)> on_failure;
+  std::function<void()> on_finished;
 };
 
 class ComponentCore final : public Strand {
@@ -64,6 +65,9 @@ class ComponentCore final : public Strand {
   // How long the handler that runs now has been running.
   Duration busy_for() const;
   void set_health(Health level, std::string reason);
+  void finish() {
+    if (environment_.on_finished) environment_.on_finished();
+  }
 
   // --- The component's members ---------------------------------------------------------------------------------------
   void add(InputBase& input) { inputs_.push_back(&input); }

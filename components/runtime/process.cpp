@@ -30,6 +30,7 @@ struct Process::Parts {
   std::mutex failure_mutex;
   std::condition_variable_any failure_or_stop;
   bool failed = false;
+  bool finished = false;
   std::function<void(const std::string&, const std::string&)> on_failure;
 
   void component_failed(ComponentCore& core, const std::string& reason) {
@@ -129,6 +130,11 @@ Result<void> Process::connect(std::unique_ptr<Participant> participant) {
   environment.on_failure = [&parts](ComponentCore& core, const std::string& reason) {
     parts.component_failed(core, reason);
   };
+  environment.on_finished = [&parts] {
+    const std::lock_guard lock(parts.failure_mutex);
+    parts.finished = true;
+    parts.failure_or_stop.notify_all();
+  };
   for (const auto& component : parts.components) component->core().connect(environment);
 
   ServiceConfig services;
@@ -213,7 +219,9 @@ int Process::run(std::stop_token stop) {
   Heartbeat heartbeat = Heartbeat::from_environment();
   const bool supervised = heartbeat.wanted();
   std::unique_lock lock(parts.failure_mutex);
-  const auto ends = [&] { return stop.stop_requested() || (parts.failed && parts.config.exit_when_a_component_fails); };
+  const auto ends = [&] {
+    return stop.stop_requested() || parts.finished || (parts.failed && parts.config.exit_when_a_component_fails);
+  };
   while (!ends()) {
     if (supervised) {
       lock.unlock();
