@@ -60,7 +60,7 @@ TEST(Allocations, ThereAreNoneFromOutputToInputInOneProcess) {
   auto& sink = harness.make<Sink>("sink");
   sink.expect_view = false;
   harness.start();
-  ASSERT_TRUE(eventually([&] { return sink.at_end != 0; }));
+  ASSERT_TRUE(eventually([&] { return sink.at_end != 0 && source.at_end != 0; }));
   EXPECT_EQ(source.at_end - source.at_start, 0u);
   EXPECT_EQ(sink.at_end - sink.at_start, 0u);
   EXPECT_EQ(source.cloud.stats().pool_misses, 0u);

@@ -17,15 +17,19 @@ class Clock {
   Time now() const { return simulated() ? Time(Duration(simulated_.load(std::memory_order_acquire))) : system_now(); }
   bool simulated() const { return source_ == Source::simulated; }
 
-  // Returns the step; negative when time jumped back (a bag was started again).
-  Duration set(Time time) {
+  struct Step {
+    Duration by{};       // negative when time jumped back (a bag was started again)
+    bool first = false;  // there was no time before
+  };
+  Step set(Time time) {
     const auto before = simulated_.exchange(time.time_since_epoch().count(), std::memory_order_acq_rel);
-    return Duration(time.time_since_epoch().count() - before);
+    return {Duration(time.time_since_epoch().count() - before), !was_set_.exchange(true)};
   }
 
  private:
   const Source source_;
   std::atomic<Duration::rep> simulated_{0};
+  std::atomic<bool> was_set_{false};
 };
 
 }  // namespace adit

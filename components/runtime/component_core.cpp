@@ -67,7 +67,9 @@ Result<void> ComponentCore::bind(const ComponentConfig& config, std::shared_ptr<
   namespace_ = config.namespace_;
   full_name_ = resolve_name(name_, namespace_, name_);
   remap_ = config.remap;
-  log_ = std::make_unique<Logger>(full_name_.substr(1), config.log_level, std::move(sink));
+  std::string logger = full_name_.substr(1);  // as rcl names it: "perception.lidar_odometry"
+  std::replace(logger.begin(), logger.end(), '/', '.');
+  log_ = std::make_unique<Logger>(logger, config.log_level, std::move(sink));
 
   for (const auto& [from, to] : remap_) {
     const auto is_from = [&, &port_name = from](const auto* port) {
@@ -255,9 +257,10 @@ Duration::rep ComponentCore::timer_now() const {
   return clock().simulated() ? clock().now().time_since_epoch().count() : steady_ns();
 }
 
-void ComponentCore::time_changed(Duration step) {
+void ComponentCore::time_changed(const Clock::Step& step) {
   if (state_ != LifecycleState::active) return;
-  if (step < Duration::zero()) pending_jump_.fetch_add(step.count());
+  if (step.by < Duration::zero()) pending_jump_.fetch_add(step.by.count());
+  if (step.by < Duration::zero() || step.first) restart_timers_ = true;
   wake();
 }
 
@@ -275,10 +278,10 @@ bool ComponentCore::run_one() {
   const std::int64_t cpu_before = thread_cpu_ns();
   bool more = false;
   try {
-    if (const Duration::rep jump = pending_jump_.exchange(0); jump != 0) {
+    if (restart_timers_.exchange(false)) {
       for (Timer* timer : timers_) timer->arm(timer_now());
-      component_.on_time_jump(Duration(jump));
     }
+    if (const Duration::rep jump = pending_jump_.exchange(0); jump != 0) component_.on_time_jump(Duration(jump));
     for (InputBase* input : inputs_) input->drain_reader();
     if (!fire_due_timer()) handle_next_message();
     more = more_to_do();

@@ -47,8 +47,9 @@ class ComponentCore final : public Strand {
   Result<void> cleanup();
   // Any state -> finalized. The component does not run any more when it returns.
   void shutdown();
-  // The simulated clock was moved by `step`: timers that are due fire, a step back is reported.
-  void time_changed(Duration step);
+  // The simulated clock was moved: timers that are due fire; after a step back, which is reported, and after the very
+  // first time they start over.
+  void time_changed(const Clock::Step& step);
   // The earliest tick of its timers on the simulated clock.
   std::optional<Time> next_simulated_tick() const;
 
@@ -124,6 +125,7 @@ class ComponentCore final : public Strand {
   std::atomic<bool> failed_{false};
   std::atomic<bool> connected_{false};
   std::atomic<Duration::rep> pending_jump_{0};
+  std::atomic<bool> restart_timers_{false};
   std::atomic<std::int64_t> cpu_ns_{0};
   std::atomic<Duration::rep> busy_since_{0};  // steady clock; 0: idle
 

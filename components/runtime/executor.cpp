@@ -40,12 +40,14 @@ Executor::~Executor() {
 
 void Executor::add(Strand& strand) {
   const std::lock_guard lock(mutex_);
+  attached(strand) = true;
   strands_.push_back(&strand);
 }
 
 void Executor::remove(Strand& strand) {
   std::unique_lock lock(mutex_);
   std::erase(strands_, &strand);
+  attached(strand) = false;
   alarm(strand) = SteadyTime::max();
   if (state(strand) == State::queued) {
     ready_.remove(strand);
@@ -59,7 +61,7 @@ void Executor::schedule(Strand& strand) {
   {
     const std::lock_guard lock(mutex_);
     if (state(strand) == State::running) state(strand) = State::running_again;
-    if (state(strand) != State::idle) return;
+    if (state(strand) != State::idle || !attached(strand)) return;
     enqueue(strand);
     wake = waiting_ > 0;
   }
@@ -132,12 +134,11 @@ void Executor::work() {
     lock.unlock();
     const bool more = strand.run_one();
     lock.lock();
-    const bool known = std::find(strands_.begin(), strands_.end(), &strand) != strands_.end();
-    if (known && (more || state(strand) == State::running_again)) {
+    if (attached(strand) && (more || state(strand) == State::running_again)) {
       enqueue(strand);
     } else {
       state(strand) = State::idle;
-      if (!known) strand_stopped_.notify_all();
+      if (!attached(strand)) strand_stopped_.notify_all();
     }
   }
 }

@@ -16,10 +16,10 @@ namespace adit {
 
 struct ExecutorConfig {
   int threads = 1;
-  int priority = 0;          // SCHED_FIFO 1..99; 0 = normal scheduling
-  std::vector<int> cpus = {};     // the threads run only on these; empty = anywhere
-  bool lock_memory = false;  // mlockall: no page faults once memory was touched
-  bool required = false;     // refuse to start without the settings above, instead of warning
+  int priority = 0;            // SCHED_FIFO 1..99; 0 = normal scheduling
+  std::vector<int> cpus = {};  // the threads run only on these; empty = anywhere
+  bool lock_memory = false;    // mlockall: no page faults once memory was touched
+  bool required = false;       // refuse to start without the settings above, instead of warning
 };
 
 // A fixed number of threads. Destroy it after every strand was removed.

@@ -94,6 +94,11 @@ TEST(Executor, RefusalsBySystemAreWarningsWithARemedyOrErrors) {
   EXPECT_THAT(warnings[0], HasSubstr("CPUs [1000] refused"));
   EXPECT_THAT(warnings[0], HasSubstr("This machine has CPUs 0.."));
 
+  warnings.clear();
+  EXPECT_TRUE(Executor::start({.threads = 2, .priority = 500}, "test", warnings));
+  ASSERT_EQ(warnings.size(), 1u);  // one for all threads
+  EXPECT_THAT(warnings[0], HasSubstr("give 1..99"));
+
   ExecutorConfig required = impossible;
   required.required = true;
   const auto refused = Executor::start(required, "test", warnings);

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <sstream>
@@ -31,7 +32,7 @@ int number_from_environment(const char* name, int otherwise) {
   return number;
 }
 
-// Writes without blocking and without SIGPIPE, whatever kind of descriptor it is.
+// Writes without blocking, whatever kind of descriptor it is.
 void send_all(int fd, const std::string& text) {
   if (send(fd, text.data(), text.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0 || errno != ENOTSOCK) return;
   static_cast<void>(!write(fd, text.data(), text.size()));
@@ -49,6 +50,7 @@ Heartbeat::Heartbeat(int supervisor_fd, std::string notify_socket)
   if (supervisor_fd_ >= 0) {
     const int flags = fcntl(supervisor_fd_, F_GETFL);
     if (flags < 0 || fcntl(supervisor_fd_, F_SETFL, flags | O_NONBLOCK) < 0) supervisor_fd_ = -1;
+    std::signal(SIGPIPE, SIG_IGN);  // a supervisor that died must not take the process with it
     if (flags >= 0) fcntl(supervisor_fd_, F_SETFD, FD_CLOEXEC);
   }
   if (!notify_address_.empty() && notify_address_.size() < sizeof(sockaddr_un::sun_path)) {

@@ -3,13 +3,14 @@
 namespace adit {
 
 void InlineScheduler::remove(Strand& strand) {
+  attached(strand) = false;
   ready_.remove(strand);
   state(strand) = State::idle;
 }
 
 void InlineScheduler::schedule(Strand& strand) {
   if (state(strand) == State::running) state(strand) = State::running_again;
-  if (state(strand) != State::idle) return;
+  if (state(strand) != State::idle || !attached(strand)) return;
   state(strand) = State::queued;
   ready_.push(strand);
 }

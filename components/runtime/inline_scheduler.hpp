@@ -8,7 +8,7 @@ namespace adit {
 // ignored: whoever owns the simulated time fires timers (OfflineRunner).
 class InlineScheduler final : public Scheduler {
  public:
-  void add(Strand&) override {}
+  void add(Strand& strand) override { attached(strand) = true; }
   void remove(Strand& strand) override;
   void schedule(Strand& strand) override;
   void set_alarm(Strand&, SteadyTime) override {}

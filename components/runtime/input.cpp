@@ -53,8 +53,8 @@ void InputBase::bind(std::string topic, const Queue& queue) {
 Result<void> InputBase::open(Participant* participant, LocalBus& bus) {
   unbounded_ = core_.environment().offline;
   ring_ = std::vector<Waiting>(queue_.size);
-  topic_ = &bus.topic(topic_name_);
   const std::lock_guard lock(endpoint_mutex_);
+  topic_ = &bus.topic(topic_name_);
   pool_.emplace(type_, queue_.size + spare_messages);
   if (!participant) return {};
   EndpointConfig config;

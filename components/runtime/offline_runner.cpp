@@ -107,7 +107,7 @@ void OfflineRunner::advance_to(Time time) {
     for (const auto& component : parts_->components) {
       if (const auto tick = component->core().next_simulated_tick()) next = std::min(next, *tick);
     }
-    const Duration step = parts_->clock.set(next);
+    const Clock::Step step = parts_->clock.set(next);
     for (const auto& component : parts_->components) component->core().time_changed(step);
     parts_->scheduler.run_until_idle();
     if (next == time) return;

@@ -34,8 +34,8 @@ OutputStats OutputBase::stats() const {
   OutputStats stats;
   stats.published = sequence_;
   stats.refused = refused_;
-  if (topic_) stats.local_readers = static_cast<std::uint32_t>(topic_->readers(*this));
   const std::lock_guard lock(endpoint_mutex_);
+  if (topic_) stats.local_readers = static_cast<std::uint32_t>(topic_->readers(*this));
   if (pool_) stats.pool_misses = pool_->misses();
   if (writer_) stats.link = writer_->stats();
   return stats;
@@ -57,11 +57,11 @@ void OutputBase::bind(std::string topic) {
 }
 
 Result<void> OutputBase::open(Participant* participant, LocalBus& bus) {
-  topic_ = &bus.topic(topic_name_);
   const std::size_t depth = qos_.depth == 0 ? max_retained : std::min<std::size_t>(qos_.depth, max_retained);
   retained_.clear();
   retained_.reserve(depth);
   const std::lock_guard lock(endpoint_mutex_);
+  topic_ = &bus.topic(topic_name_);
   pool_.emplace(type_, std::min<std::size_t>(depth, 16) + spare_messages);
   if (!participant) return {};
   EndpointConfig config;
@@ -146,20 +146,27 @@ bool OutputBase::send(const void* message, const MessageInfo& info) {
 
 void OutputBase::update_local_links(std::span<InputBase* const> inputs) {
   links_.clear();
+  std::vector<InputBase*> refused;
   for (InputBase* input : inputs) {
-    if (input->type_.info->dds_name != type_.info->dds_name) {
-      core_.log().error("{}: this output has type {}, the input '{}' of {} has type {}: not connected", topic_name_,
-                        type_.info->ros_name, input->name_, input->core_.full_name(), input->type_.info->ros_name);
+    const bool same_type = input->type_.info->dds_name == type_.info->dds_name;
+    const std::vector<Mismatch> mismatches = check(qos_, input->qos_);
+    if (same_type && mismatches.empty()) {
+      links_.push_back(input);
       continue;
     }
-    const std::vector<Mismatch> mismatches = check(qos_, input->qos_);
+    refused.push_back(input);
+    if (std::find(refused_links_.begin(), refused_links_.end(), input) != refused_links_.end()) continue;
+    if (!same_type) {
+      core_.log().error("{}: this output has type {}, the input '{}' of {} has type {}: not connected", topic_name_,
+                        type_.info->ros_name, input->name_, input->core_.full_name(), input->type_.info->ros_name);
+    }
     for (const Mismatch& mismatch : mismatches) {
       core_.log().error("{}: not connected to the input '{}' of {}: {} offered is {}, requested is {}; {}", topic_name_,
                         input->name_, input->core_.full_name(), mismatch.policy, mismatch.offered, mismatch.requested,
                         mismatch.remedy);
     }
-    if (mismatches.empty()) links_.push_back(input);
   }
+  refused_links_ = std::move(refused);
 }
 
 void OutputBase::deliver_locally(const std::shared_ptr<const void>& message, const MessageInfo& info) {

@@ -80,7 +80,8 @@ class OutputBase {
   mutable std::mutex endpoint_mutex_;  // writer_ and pool_ against stats()
   std::unique_ptr<Writer> writer_;
   std::optional<MessagePool> pool_;
-  std::vector<InputBase*> links_;  // guarded by the topic's lock
+  std::vector<InputBase*> links_;          // guarded by the topic's lock
+  std::vector<InputBase*> refused_links_;  // the same; what was reported already
   std::mutex retained_mutex_;
   std::vector<Retained> retained_;  // ring of the last qos.depth messages of a latched output
   std::size_t retained_next_ = 0;

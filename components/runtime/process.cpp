@@ -144,7 +144,7 @@ Result<void> Process::connect(std::unique_ptr<Participant> participant) {
   services.rosout = parts.config.rosout;
   services.sink = parts.sink;
   services.set_clock = [&parts](Time now) {
-    const Duration step = parts.clock->set(now);
+    const Clock::Step step = parts.clock->set(now);
     for (const auto& component : parts.components) component->core().time_changed(step);
   };
   services.status = [&parts] { return parts.status(); };

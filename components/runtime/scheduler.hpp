@@ -18,6 +18,7 @@ class Strand {
   friend class Scheduler;
   enum class State { idle, queued, running, running_again };
   State state_ = State::idle;
+  bool attached_ = false;
   Strand* next_ = nullptr;
   SteadyTime alarm_ = SteadyTime::max();
 };
@@ -26,8 +27,8 @@ class Strand {
 class Scheduler {
  public:
   virtual ~Scheduler() = default;
-  // Adding and removing happens outside the data path. After remove() returns, the strand does not run any more; must
-  // not be called from the strand itself.
+  // Adding and removing happens outside the data path. After remove() returns, the strand does not run any more and
+  // schedule() ignores it; must not be called from the strand itself.
   virtual void add(Strand& strand) = 0;
   virtual void remove(Strand& strand) = 0;
   // The strand has work. Any thread; never blocks longer than a short lock, never allocates.
@@ -40,6 +41,7 @@ class Scheduler {
  protected:
   using State = Strand::State;
   static State& state(Strand& strand) { return strand.state_; }
+  static bool& attached(Strand& strand) { return strand.attached_; }
   static SteadyTime& alarm(Strand& strand) { return strand.alarm_; }
 
   // First in, first out, linked through the strands themselves.

@@ -57,6 +57,7 @@ TEST(Timer, FiresAtItsSimulatedTimes) {
 
 TEST(Timer, CountsTicksThatWereMissedAndKeepsItsSchedule) {
   Harness harness(0, nullptr, Clock::Source::simulated);
+  harness.clock.set(at(0ms));
   auto& ticking = harness.make<Ticking>("ticking", {}, 100ms);
   harness.start();
   for (Duration t : {350ms, 400ms}) {
@@ -66,6 +67,19 @@ TEST(Timer, CountsTicksThatWereMissedAndKeepsItsSchedule) {
   EXPECT_THAT(ticking.scheduled, ElementsAre(300ms, 400ms));
   EXPECT_THAT(ticking.missed, ElementsAre(2, 0));
   EXPECT_EQ(ticking.timer.stats().missed, 2u);
+}
+
+TEST(Timer, TheFirstTimeEverIsNoLongListOfMissedTicks) {
+  Harness harness(0, nullptr, Clock::Source::simulated);
+  auto& ticking = harness.make<Ticking>("ticking", {}, 100ms);
+  harness.start();
+  for (Duration t : {Duration(1000000s), Duration(1000000s + 100ms)}) {
+    harness.set_time(at(t));
+    harness.step();
+  }
+  EXPECT_THAT(ticking.scheduled, ElementsAre(1000000s + 100ms));
+  EXPECT_THAT(ticking.missed, ElementsAre(0));
+  EXPECT_TRUE(ticking.jumps.empty());
 }
 
 TEST(Timer, AJumpBackIsReportedAndTheScheduleStartsOver) {

@@ -48,7 +48,7 @@ void Harness::start() {
 }
 
 void Harness::set_time(Time time) {
-  const Duration step = clock.set(time);
+  const Clock::Step step = clock.set(time);
   for (const auto& component : components_) component->core().time_changed(step);
 }
 
