@@ -5,6 +5,7 @@
 #include <dds/ddsi/q_radmin.h>
 #include <dds/version.h>
 
+#include <atomic>
 #include <cstdio>
 #include <cstring>
 #include <limits>
@@ -113,6 +114,8 @@ bool untyped_to_object(const ddsi_sertype*, const ddsi_serdata*, void*, void**, 
 
 void free_sample(ddsi_serdata* data) {
   RawSample* const sample = raw(data);
+  // What others did with the sample before they let go is done (see release below).
+  static_cast<void>(std::atomic_ref(sample->refc.v).load(std::memory_order_acquire));
   const std::size_t capacity = sample->capacity;
   sample->~RawSample();
   return_block(sample, capacity);
@@ -219,9 +222,15 @@ ddsi_sertype* make_raw_type(const char* dds_type_name) {
   return type;
 }
 
+// Cyclone's ddsi_serdata_ref and ddsi_serdata_unref, with atomic operations that ThreadSanitizer sees.
 const KeepAliveOperations raw_sample_reference = {
-    [](void* handle) noexcept { ddsi_serdata_ref(static_cast<RawSample*>(handle)); },
-    [](void* handle) noexcept { ddsi_serdata_unref(static_cast<RawSample*>(handle)); },
+    [](void* handle) noexcept {
+      std::atomic_ref(static_cast<RawSample*>(handle)->refc.v).fetch_add(1, std::memory_order_relaxed);
+    },
+    [](void* handle) noexcept {
+      auto* const sample = static_cast<RawSample*>(handle);
+      if (std::atomic_ref(sample->refc.v).fetch_sub(1, std::memory_order_acq_rel) == 1) free_sample(sample);
+    },
 };
 
 }  // namespace adit::cyclonedds
