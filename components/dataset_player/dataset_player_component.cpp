@@ -49,6 +49,7 @@ class DatasetPlayerComponent final : public Component {
   std::size_t next_ = 0;  // entry that goes out next
   std::uint64_t played_ = 0;
   std::uint64_t unanswered_ = 0;
+  int resent_ = 0;  // times the first file went out again
   std::int64_t loop_offset_ns_ = 0;
   bool waiting_for_readers_ = true;
   bool answered_once_ = false;
@@ -98,6 +99,7 @@ Result<void> DatasetPlayerComponent::configure() {
 Result<void> DatasetPlayerComponent::activate() {
   next_ = 0;
   played_ = unanswered_ = 0;
+  resent_ = 0;
   loop_offset_ns_ = 0;
   waiting_for_readers_ = true;
   answered_once_ = done_ = false;
@@ -121,7 +123,8 @@ void DatasetPlayerComponent::tick() {
   // Lockstep, and no answer yet. The very first file is sent again: who answers may have been found by discovery only
   // after it went out.
   const double waited = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_time_).count();
-  if (!answered_once_ && waited > 0.5 && waited < answer_timeout_) {
+  if (!answered_once_ && waited > 0.5 * (resent_ + 1) && waited < answer_timeout_) {
+    ++resent_;
     if (Result<void> sent = publish(dataset_.entries[next_ - 1]); !sent) log().error("{}", sent.error().message);
     return;
   }
