@@ -131,7 +131,11 @@ Result<Configuration> make_configuration(const ParticipantConfig& config) {
   xml << "</Peers></Discovery><Internal>"
       << "<SocketReceiveBufferSize min=\"" << result.receive_buffer << "B\" max=\"" << result.receive_buffer << "B\"/>"
       << "<SocketSendBufferSize min=\"" << result.send_buffer << "B\" max=\"" << result.send_buffer << "B\"/>"
-      << "<GenerateKeyhash>true</GenerateKeyhash></Internal></Domain>";
+      << "<GenerateKeyhash>true</GenerateKeyhash>"
+      // Repair of a lost 4 MB sample in one round: the defaults stop after 512 kB and ask again 100 ms later.
+      << "<BurstSize><MaxRexmit>16MB</MaxRexmit></BurstSize>"
+      << "<MaxQueuedRexmitBytes>16MB</MaxQueuedRexmitBytes><MaxQueuedRexmitMessages>2000</MaxQueuedRexmitMessages>"
+      << "<NackDelay>20ms</NackDelay></Internal></Domain>";
   result.xml = xml.str();
   return result;
 }
