@@ -1,6 +1,7 @@
 #include "middleware/fastdds/writer.hpp"
 
 #include <cstring>
+#include <thread>
 
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
@@ -75,15 +76,27 @@ FastWriter::~FastWriter() {
 
 Result<void> FastWriter::publish(const Encoder& message, Time source_time) {
   CountingEncoder counting(message);
-  const ReturnCode_t code =
-      writer_->write_w_timestamp(static_cast<Encoder*>(&counting), dds::HANDLE_NIL, to_vendor_time(source_time));
+  const auto write = [&] {
+    return writer_->write_w_timestamp(static_cast<Encoder*>(&counting), dds::HANDLE_NIL, to_vendor_time(source_time));
+  };
+  const auto start = std::chrono::steady_clock::now();
+  ReturnCode_t code = write();
+  // Room may come before max_blocking is over. A volatile keep-all writer that waits for it is told "time-out" too
+  // early when all its samples are acknowledged at once (the vendor then finds no oldest sample to remove); and the
+  // payloads of a topic are shared within a process, where a reader that is full holds them.
+  const bool reliable = config_.qos.reliability == Qos::Reliability::reliable;
+  while (reliable && (code == ReturnCode_t::RETCODE_TIMEOUT || code == ReturnCode_t::RETCODE_OUT_OF_RESOURCES) &&
+         std::chrono::steady_clock::now() - start < config_.qos.max_blocking) {
+    if (code == ReturnCode_t::RETCODE_OUT_OF_RESOURCES) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    code = write();
+  }
   if (code == ReturnCode_t::RETCODE_OK) {
     sent_.fetch_add(1, std::memory_order_relaxed);
     sent_bytes_.fetch_add(counting.written(), std::memory_order_relaxed);
     return {};
   }
   failed_.fetch_add(1, std::memory_order_relaxed);
-  if (code == ReturnCode_t::RETCODE_TIMEOUT) {
+  if (code == ReturnCode_t::RETCODE_TIMEOUT || code == ReturnCode_t::RETCODE_OUT_OF_RESOURCES) {
     return Error{ErrorCode::timeout, "'" + config_.topic + "': a reliable reader took no sample for max_blocking"};
   }
   if (counting.written() < 4)
