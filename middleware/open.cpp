@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <mutex>
+#include <sstream>
 
 #include "middleware/ros/ros_participant.hpp"
 #include "middleware/vendor.hpp"
@@ -107,6 +108,20 @@ std::span<const std::string_view> built_in_vendors() {
     return all;
   }();
   return {names.data(), vendor_count};
+}
+
+std::vector<std::string> warnings_in(const std::string& explanation) {
+  std::vector<std::string> warnings;
+  std::istringstream lines(explanation);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string first, rest;
+    words >> first;
+    if (first != "warning" && first != "warning:") continue;
+    std::getline(words >> std::ws, rest);
+    warnings.push_back(rest);
+  }
+  return warnings;
 }
 
 Result<const VendorModule*> load_vendor(std::string_view name) {

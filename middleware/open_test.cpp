@@ -61,5 +61,10 @@ TEST(Open, TheEnvironmentNamesTheVendorUnlessTheConfigurationDoes) {
   unsetenv("ADIT_MIDDLEWARE");
 }
 
+TEST(Open, WarningsAreTheLinesThatSaySo) {
+  EXPECT_EQ(warnings_in("a: b\nwarning: small buffers\n  warning   no memory\nno warning here\n"),
+            (std::vector<std::string>{"small buffers", "no memory"}));
+}
+
 }  // namespace
 }  // namespace adit

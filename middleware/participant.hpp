@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "idl/result.hpp"
 #include "idl/type_info.hpp"
@@ -72,6 +73,7 @@ class Participant {
   // the participant. Same replacement rule as Reader::on_data.
   virtual void on_event(EventHandler handler) = 0;
   // The vendor configuration really in force (transports, buffers as granted, sizes, discovery), for a person to read.
+  // Lines whose first word is "warning" ask for something to be done (small kernel buffers, no shared memory, ...).
   virtual std::string explain() const = 0;
 
   virtual const ParticipantConfig& config() const = 0;
@@ -82,6 +84,9 @@ class Participant {
 // one process. Refusals say what to do: unknown vendor or one not built in (with the list of those that are), domain
 // out of range, interface that does not exist, no free participant index, unreadable keystore.
 Result<std::unique_ptr<Participant>> open(const ParticipantConfig& config);
+
+// The warnings of an explanation, without that word: what a process logs when it starts.
+std::vector<std::string> warnings_in(const std::string& explanation);
 
 // The vendors this build can open, in order of preference.
 std::span<const std::string_view> built_in_vendors();

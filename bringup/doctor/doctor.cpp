@@ -20,6 +20,7 @@
 #include <sstream>
 
 #include "bringup/commands/graph_table.hpp"
+#include "bringup/supervisor/shared_memory.hpp"
 #include "middleware/participant.hpp"
 
 namespace adit::doctor {
@@ -29,22 +30,6 @@ using Level = Finding::Level;
 
 std::string megabytes(std::size_t bytes) {
   return std::to_string(bytes >> 20) + " MB";
-}
-
-// Every name under `prefix` in /dev/shm that some process has mapped, from /proc/*/maps.
-std::set<std::string> mapped_segments(const Machine& machine) {
-  std::set<std::string> mapped;
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(machine.proc, ignored)) {
-    const std::string pid = entry.path().filename();
-    if (!std::isdigit(static_cast<unsigned char>(pid.front()))) continue;
-    std::ifstream maps(entry.path() / "maps");
-    for (std::string line; std::getline(maps, line);) {
-      const std::size_t at = line.find(machine.shm + "/");
-      if (at != std::string::npos) mapped.insert(line.substr(at + machine.shm.size() + 1));
-    }
-  }
-  return mapped;
 }
 
 }  // namespace
@@ -96,7 +81,7 @@ Finding check_stale_segments(const Machine& machine) {
     }
   }
   if (segments.empty()) return {Level::ok, "stale shared memory", "none", ""};
-  const std::set<std::string> mapped = mapped_segments(machine);
+  const std::set<std::string> mapped = mapped_segments(machine.proc, machine.shm);
   std::string stale;
   for (const std::string& name : segments) {
     if (!mapped.contains(name)) stale += " " + machine.shm + "/" + name;

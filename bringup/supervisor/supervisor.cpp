@@ -14,7 +14,10 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <set>
 #include <sstream>
+
+#include "bringup/supervisor/shared_memory.hpp"
 
 namespace adit {
 
@@ -24,6 +27,7 @@ struct Supervisor::Child {
   int reports = -1;  // our end of its heartbeat socket
   HeartbeatParser parser;
   bool hung = false;
+  std::set<std::string> segments;  // shared memory it was seen to use
   Steady::time_point started{};
   Steady::time_point last_report{};
   Steady::time_point restart_at = Steady::time_point::max();
@@ -203,6 +207,7 @@ void Supervisor::read_reports(Child& child) {
   char text[8192];
   for (ssize_t size = 0; (size = ::recv(child.reports, text, sizeof text, 0)) > 0;) {
     child.last_report = Steady::now();
+    if (child.status.report.number % 16 == 0) child.segments.merge(segments_of("/proc", "/dev/shm", child.status.pid));
     child.parser.feed({text, static_cast<std::size_t>(size)});
     while (std::optional<HeartbeatReport> report = child.parser.next()) child.status.report = *std::move(report);
     if (child.status.state != State::starting) continue;
@@ -231,6 +236,12 @@ void Supervisor::ended(Child& child, int wait_status) {
   child.status.pid = 0;
   child.status.rss_bytes = 0;
   child.status.last_end = child.hung ? "no heartbeat, killed" : describe_end(wait_status);
+  if (!well) {
+    const std::size_t removed = remove_unmapped(child.segments, "/proc", "/dev/shm");
+    if (removed > 0)
+      log(child.spec.name + ": removed " + std::to_string(removed) + " shared-memory segments it left behind");
+  }
+  child.segments.clear();
   const auto now = Steady::now();
   if (now - child.started >= child.spec.restart.healthy_after) child.restarts_in_a_row = 0;
 

@@ -111,6 +111,7 @@ Result<void> Process::connect(std::unique_ptr<Participant> participant) {
   Parts& parts = *parts_;
   parts.participant = std::move(participant);
   if (parts.participant) {
+    for (const std::string& warning : warnings_in(parts.participant->explain())) parts.log->warn("{}", warning);
     parts.participant->on_event([&parts](const Event& event) {
       if (event.kind == Event::Kind::qos_mismatch) parts.log->error("{}: {}", event.topic, event.text);
       if (event.kind == Event::Kind::liveliness_lost) parts.log->warn("{}: {}", event.topic, event.text);
