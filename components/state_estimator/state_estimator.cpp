@@ -420,7 +420,10 @@ MapCorrection::Outcome StateEstimator::add_closure(std::int64_t stamp_ns, const 
 Estimate StateEstimator::to_estimate(const FilterState& state) const {
   Estimate e;
   e.stamp_ns = state.stamp_ns;
-  const Eigen::Matrix3d level = tilt_.ready() ? tilt_.level() : tilt_from_odometry_;
+  // An odometry's roll and pitch are smoother than the IMU's, which shakes with the body; without one, the IMU's.
+  const bool from_odometry =
+      height_ns_ != kNoStamp && seconds_between(height_ns_, state.stamp_ns) < 2.0 * config_.outage_s;
+  const Eigen::Matrix3d level = tilt_.ready() && !from_odometry ? tilt_.level() : tilt_from_odometry_;
   e.pose.linear() = so3_exp({0.0, 0.0, state.x(kYaw)}) * level;
   e.pose.translation() = Eigen::Vector3d(state.x(kX), state.x(kY), height_);
   e.speed = state.x(kSpeed);
