@@ -45,7 +45,8 @@ struct GenzConfig {
 // Mode default. The sizes suit indoor rooms to road tunnels; noise figures come from the sensor's data sheet.
 struct SurfelConfig {
   std::size_t block_columns = 0, block_rows = 0;  // pixels of an image block; 0: from the image size
-  double selection_cell = 0.20;                   // one surfel in a cell of this size
+  double selection_cell = 0.20;                   // one surfel in a cell of this size;
+  std::size_t min_surfels = 1500;                 // with fewer than this, a half or a quarter of the size
   double range_sigma = 0.02;                      // m, noise of a range
   double max_extent = 1.5, min_width = 0.02;      // m, standard deviations along a surfel
   double planarity = 0.15;                        // largest ratio of variances, thickness to width

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <fstream>
 #include <random>
 #include <string>
 
@@ -155,6 +156,45 @@ int scene(Config config, const std::string& name, double speed, int scans, doubl
   return 0;
 }
 
+// A recording of a sensor at rest: every step is an error.
+int standing(const Config& config, const std::string& name, std::int64_t unit) {
+  LidarOdometry odometry(config);
+  Pose last = Pose::Identity();
+  for (const RecordedSweep& sweep : read_sweeps(*shared_data(name), unit)) {
+    const Estimate& e = odometry.process(sweep.cloud());
+    const Vector6d d = se3_log(last.inverse() * e.pose);
+    last = e.pose;
+    std::printf(
+        "%-12s step %.2f mm %.4f deg  total %.2f mm %.4f deg n %u matched %u solves %u weak %d sigma %.4f %.5f\n",
+        std::string(to_string(e.status)).c_str(), 1e3 * d.head<3>().norm(), 57.3 * d.tail<3>().norm(),
+        1e3 * e.pose.translation().norm(), 57.3 * so3_log(e.pose.linear()).norm(), e.scan.registered, e.scan.matched,
+        e.scan.solves, e.localizability.unobservable(), e.localizability.translation[0].sigma,
+        e.localizability.rotation[0].sigma);
+  }
+  return 0;
+}
+
+int pair(const Config& config) {
+  const std::string folder = *shared_data("small_gicp_pair");
+  std::ifstream file(folder + "/T_target_source.txt");
+  Pose truth = Pose::Identity();
+  for (int r = 0; r < 4; ++r) {
+    for (int c = 0; c < 4; ++c) file >> truth.matrix()(r, c);
+  }
+  LidarOdometry odometry(config);
+  RecordedSweep target, source;
+  target.points = read_ply(folder + "/target.ply");
+  source.points = read_ply(folder + "/source.ply");
+  source.stamp_ns = 100'000'000;
+  odometry.process(target.cloud());
+  const Estimate& e = odometry.process(source.cloud());
+  const Vector6d d = se3_log(truth.inverse() * e.pose);
+  std::printf("%s error %.4f m %.3f deg n %u matched %u solves %u weak %d\n", std::string(to_string(e.status)).c_str(),
+              d.head<3>().norm(), 57.3 * d.tail<3>().norm(), e.scan.registered, e.scan.matched, e.scan.solves,
+              e.localizability.unobservable());
+  return 0;
+}
+
 int subt(const Config& config, double sigma_t, double sigma_r) {
   const std::string folder = *shared_data("subt_anymal_vlp16");
   LidarOdometry odometry(config);
@@ -212,6 +252,7 @@ void take_settings(int& argc, char** argv, SurfelConfig& c) {
     const std::string name = text.substr(0, equals);
     const double value = std::atof(text.c_str() + equals + 1);
     if (name == "block_columns") c.block_columns = static_cast<std::size_t>(value);
+    if (name == "min_surfels") c.min_surfels = static_cast<std::size_t>(value);
     if (name == "block_rows") c.block_rows = static_cast<std::size_t>(value);
     for (const auto& [key, target] : settings) {
       if (name == key) *target = value;
@@ -234,6 +275,9 @@ int main(int argc, char** argv) {
     return scene(config, arg(3), std::atof(arg(4).c_str()), std::atoi(arg(5).c_str()),
                  arg(6).empty() || arg(6) == "none" ? std::nan("") : std::atof(arg(6).c_str()), model);
   }
+  if (arg(1) == "opencalib") return standing(config, "opencalib_static_64", 1);
+  if (arg(1) == "vlp16") return standing(config, "vlp16_static", 1000);
+  if (arg(1) == "pair") return pair(config);
   if (arg(1) == "subt") {
     if (argc > 3) config.max_range = std::atof(argv[3]);
     if (argc > 4) config.kiss.voxel_size = config.genz.voxel_size = std::atof(argv[4]);

@@ -150,13 +150,18 @@ void SurfelExtractor::extract(const Cloud& image, WorkerPool& pool, std::vector<
     counters.out_of_range += row.out_of_range;
   }
 
-  selected_.clear();
-  filter_.begin(blocks_.size());
-  const auto inverse_cell = static_cast<float>(1.0 / c.selection_cell);
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    if (blocks_[i].count > 0.0f && filter_.first(pack(cell_of(blocks_[i].mean, inverse_cell)))) {
-      selected_.push_back(static_cast<std::uint32_t>(i));
+  // The first block of each cell; in narrow places, or with few rings, of each smaller cell.
+  double cell = c.selection_cell;
+  for (int halving = 0; halving < 3; ++halving, cell *= 0.5) {
+    selected_.clear();
+    filter_.begin(blocks_.size());
+    const auto inverse_cell = static_cast<float>(1.0 / cell);
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      if (blocks_[i].count > 0.0f && filter_.first(pack(cell_of(blocks_[i].mean, inverse_cell)))) {
+        selected_.push_back(static_cast<std::uint32_t>(i));
+      }
     }
+    if (selected_.size() >= c.min_surfels) break;
   }
 
   constexpr std::size_t chunk = 256;

@@ -9,6 +9,11 @@ constexpr int wide_gate_sweeps = 5;  // after the start: the map is thin and the
 constexpr double wide_gate = 0.5;    // m
 constexpr double gate = 0.2;         // m
 
+// Where the vehicle may be at the second sweep if it was already moving at the first.
+constexpr double start_shift_step = 0.4;                         // m, along the sensor's x
+constexpr int start_shifts = 5;                                  // to either side: 20 m/s at 10 Hz
+constexpr double start_translation = 2.0, start_rotation = 0.2;  // m and rad, sigma of that prior
+
 }  // namespace
 
 SurfelOdometry::SurfelOdometry(const Config& config, WorkerPool& pool)
@@ -60,6 +65,34 @@ SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
   return twist;
 }
 
+// The second sweep without any knowledge of the velocity: if the match at rest does not convince, others along the
+// heading may. The effective information about the weakest translation tells the right one.
+SurfelRegistrationResult SurfelOdometry::search_start(const SweepTask& task, const SurfelPrior& prior,
+                                                      const SweepTwist& twist, std::size_t needed,
+                                                      const SurfelRegistrationResult& at_rest) {
+  const auto strength = [&](const SurfelRegistrationResult& result) {
+    return result.matched < needed ? -1e9 : result.directions.information.head<3>().minCoeff();
+  };
+  const double required = 1.0 / (config_.surfel.required_translation * config_.surfel.required_translation);
+  if (strength(at_rest) > required && at_rest.matched > surfels_.size() * 4 / 5) return at_rest;
+  SurfelPrior loose = prior;
+  loose.information.setZero();
+  loose.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (start_translation * start_translation)),
+      Eigen::Vector3d::Constant(1.0 / (start_rotation * start_rotation));
+  SurfelRegistrationResult best = at_rest;
+  for (int i = -start_shifts; i <= start_shifts; ++i) {
+    Pose guess = task.prediction;
+    guess.translation() += start_shift_step * i * guess.linear().col(0);
+    const SurfelRegistrationResult shifted =
+        registration_.align(surfels_, map_, guess, loose, twist, wide_gate, needed, pool_);
+    if (strength(shifted) > required && strength(shifted) > 1.2 * strength(best)) best = shifted;
+  }
+  SweepTwist settled = twist;
+  settled.predicted = twist.dt > 0.0 ? Vector6d(se3_log(task.last.inverse() * best.pose) / twist.dt) : twist.predicted;
+  registration_.place(surfels_, best.pose, settled);
+  return best;
+}
+
 void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
   estimate.pose = task.prediction;
   const Cloud image = image_.organise(task.cloud);
@@ -76,9 +109,11 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
   } else {
     const bool wide = sweeps_ < wide_gate_sweeps;
     const std::size_t needed = std::max<std::size_t>(30, surfels_.size() / 10);
-    const SurfelRegistrationResult result =
-        registration_.align(surfels_, map_, task.prediction, prior_of(task), twist,
+    const SurfelPrior prior = prior_of(task);
+    SurfelRegistrationResult result =
+        registration_.align(surfels_, map_, task.prediction, prior, twist,
                             wide ? wide_gate : std::max(gate, 12.0 * last_median_), needed, pool_);
+    if (sweeps_ == 1 && !task.external) result = search_start(task, prior, twist, needed, result);
     estimate.scan.matched = static_cast<std::uint32_t>(result.matched);
     estimate.scan.associations = static_cast<std::uint32_t>(result.associations);
     estimate.scan.solves = static_cast<std::uint32_t>(result.solves);

@@ -23,6 +23,8 @@ class SurfelOdometry final : public Pipeline {
  private:
   SurfelPrior prior_of(const SweepTask& task) const;
   SweepTwist twist_of(const SweepTask& task) const;
+  SurfelRegistrationResult search_start(const SweepTask& task, const SurfelPrior& prior, const SweepTwist& twist,
+                                        std::size_t needed, const SurfelRegistrationResult& at_rest);
 
   Config config_;
   WorkerPool& pool_;

@@ -8,7 +8,9 @@
 namespace adit::lidar_odometry {
 namespace {
 
-constexpr int max_associations = 3;
+constexpr int usual_associations = 3;
+constexpr int max_associations = 10;     // while the pose still moves by more than settled_step
+constexpr double settled_step = 2e-2;    // m
 constexpr int max_solves = 3;            // for each association
 constexpr double converged_step = 5e-4;  // m
 constexpr double mean_range = 10.0;      // m: turns radians into metres for the stop test
@@ -149,7 +151,9 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
   SurfelRegistrationResult result;
   result.pose = guess;
   Pose pose = guess;
-  for (int outer = 0; outer < max_associations; ++outer) {
+  double moved = 0.0;  // m, by the last association
+  for (int outer = 0; outer < usual_associations || (outer < max_associations && moved > settled_step); ++outer) {
+    moved = 0.0;
     compensate(surfels, twist, pose, pool);
     associate(map, pose, gate, pool);
     ++result.associations;
@@ -176,7 +180,9 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
       }
       pose.translation() += step.head<3>();
       pose.linear() = orthonormalized(so3_exp(step.tail<3>()) * pose.linear());
-      if (step.head<3>().norm() + mean_range * step.tail<3>().norm() < converged_step) break;
+      const double length = step.head<3>().norm() + mean_range * step.tail<3>().norm();
+      moved += length;
+      if (length < converged_step) break;
     }
   }
   result.pose = pose;
