@@ -141,7 +141,7 @@ TEST(RealData, DoesNotTrustAFalseMatch) {
       const double error = (truth.translation() - e.pose.translation()).norm();
       if (with_prior) {
         EXPECT_TRUE(registered(e.status)) << i << ' ' << j;
-        EXPECT_LT(error, 0.05) << i << ' ' << j;
+        EXPECT_LT(error, 0.05) << i << ' ' << j << ' ' << to_string(e.status);
       } else {
         EXPECT_TRUE(error < 0.1 || e.status != Status::ok) << i << ' ' << j << " off by " << error;
       }

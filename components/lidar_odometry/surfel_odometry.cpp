@@ -14,6 +14,10 @@ constexpr double start_shift_step = 0.4;                         // m, along the
 constexpr int start_shifts = 5;                                  // to either side: 20 m/s at 10 Hz
 constexpr double start_translation = 2.0, start_rotation = 0.2;  // m and rad, sigma of that prior
 
+bool translation_observable(const Directions& directions) {
+  return directions.observable[0] && directions.observable[1] && directions.observable[2];
+}
+
 }  // namespace
 
 SurfelOdometry::SurfelOdometry(const Config& config, WorkerPool& pool)
@@ -76,6 +80,7 @@ SurfelRegistrationResult SurfelOdometry::search_start(const SweepTask& task, con
   const double required = 1.0 / (config_.surfel.required_translation * config_.surfel.required_translation);
   if (strength(at_rest) > required && at_rest.matched > surfels_.size() * 4 / 5) return at_rest;
   SurfelPrior loose = prior;
+  loose.decides_weak_directions = false;
   loose.information.setZero();
   loose.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (start_translation * start_translation)),
       Eigen::Vector3d::Constant(1.0 / (start_rotation * start_rotation));
@@ -110,9 +115,18 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     const bool wide = sweeps_ < wide_gate_sweeps;
     const std::size_t needed = std::max<std::size_t>(30, surfels_.size() / 10);
     const SurfelPrior prior = prior_of(task);
-    SurfelRegistrationResult result =
-        registration_.align(surfels_, map_, task.prediction, prior, twist,
-                            wide ? wide_gate : std::max(gate, 12.0 * last_median_), needed, pool_);
+    const bool only_guess = task.external && task.information.isZero(0.0);
+    const double residual_gate = wide || only_guess ? wide_gate : std::max(gate, 12.0 * last_median_);
+    SurfelRegistrationResult result;
+    if (only_guess) {
+      SurfelPrior loose = prior;
+      loose.decides_weak_directions = false;
+      result = registration_.align(surfels_, map_, task.prediction, loose, twist, residual_gate, needed, pool_);
+    }
+    // From outside without a width: the match alone, unless it then turns out weak.
+    if (!only_guess || result.matched < needed || !translation_observable(result.directions)) {
+      result = registration_.align(surfels_, map_, task.prediction, prior, twist, residual_gate, needed, pool_);
+    }
     if (sweeps_ == 1 && !task.external) result = search_start(task, prior, twist, needed, result);
     estimate.scan.matched = static_cast<std::uint32_t>(result.matched);
     estimate.scan.associations = static_cast<std::uint32_t>(result.associations);

@@ -167,7 +167,7 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
       Sums sums = linearise(pose, kernel, pool);
       result.rms_residual = std::sqrt(sums.squared / std::max(sums.weight, 1e-12));
       if (inner == 0) result.directions = information_.analyse(sums.hessian, constraints_);
-      information_.attenuate(result.directions, sums.hessian, sums.gradient);
+      if (prior.decides_weak_directions) information_.attenuate(result.directions, sums.hessian, sums.gradient);
       Vector6d error;
       error << pose.translation() - prior.pose.translation(), so3_log(pose.linear() * prior.pose.linear().transpose());
       const Matrix6d hessian = sums.hessian + prior.information;

@@ -16,6 +16,9 @@ namespace adit::lidar_odometry {
 struct SurfelPrior {
   Pose pose = Pose::Identity();
   Matrix6d information = Matrix6d::Zero();
+  // Weak directions of the match follow the prior. False: the match decides alone, for better or worse; for a guess
+  // that is known to be wrong by more than the match.
+  bool decides_weak_directions = true;
 };
 
 // The motion within the sweep, predicted, and how much of the estimated one replaces it at each association: a share
