@@ -1,5 +1,6 @@
 #include <csignal>
 #include <cstdio>
+#include <memory>
 #include <thread>
 
 #include "bringup/commands/command.hpp"
@@ -21,7 +22,7 @@ struct Arguments {
 // SIGINT and SIGTERM as a stop request. Blocks them for all threads that are started later.
 class StopOnSignal {
  public:
-  StopOnSignal() {
+  StopOnSignal() : source_(std::make_unique<std::stop_source>()) {
     ::sigemptyset(&signals_);
     ::sigaddset(&signals_, SIGINT);
     ::sigaddset(&signals_, SIGTERM);
@@ -29,15 +30,15 @@ class StopOnSignal {
     waiter_ = std::jthread([this](const std::stop_token& over) {
       const timespec slice{0, 50'000'000};
       while (!over.stop_requested()) {
-        if (::sigtimedwait(&signals_, nullptr, &slice) > 0) source_.request_stop();
+        if (::sigtimedwait(&signals_, nullptr, &slice) > 0) source_->request_stop();
       }
     });
   }
-  std::stop_token token() const { return source_.get_token(); }
+  std::stop_token token() const { return source_->get_token(); }
 
  private:
   sigset_t signals_{};
-  std::stop_source source_;
+  std::unique_ptr<std::stop_source> source_;
   std::jthread waiter_;
 };
 
