@@ -11,7 +11,10 @@ int main(int argc, char** argv) {
   adit::add_node_command(app, code);
   adit::add_doctor_command(app, code);
   adit::add_explain_command(app, code);
+#ifdef ADIT_HAS_STACK
   adit::add_evaluate_command(app, code);
+  adit::add_odometry_command(app, code);
+#endif
   CLI11_PARSE(app, argc, argv);
   return code;
 }

@@ -75,6 +75,18 @@ Value::Map declared_only(Value::Map parameters, const std::string& type) {
   return parameters;
 }
 
+// What the parameter files say to one component: for all nodes first, then by its names.
+Value::Map parameters_of(const Common& common, const std::string& type, const std::string& name,
+                         const std::string& node_namespace) {
+  Value::Map parameters;
+  for (const std::string& node : {std::string("/**"), name, join_node_name(node_namespace, name)}) {
+    const auto found = common.parameters.find(node);
+    if (found == common.parameters.end()) continue;
+    merge(parameters, node == "/**" ? declared_only(found->second, type) : found->second);
+  }
+  return parameters;
+}
+
 void read_middleware(const YamlSection& section, ParticipantConfig& config) {
   config.vendor = section.choice("vendor", {"fastdds", "cyclonedds"}, config.vendor);
   config.network = section.text("network", config.network);
@@ -149,12 +161,7 @@ ComponentConfig read_component(const YamlSection& section, const Common& common)
                      : level == "error" ? LogLevel::error
                      : level == "fatal" ? LogLevel::fatal
                                         : LogLevel::info;
-  Value::Map parameters;
-  for (const std::string& node : {std::string("/**"), config.name, join_node_name(config.namespace_, config.name)}) {
-    const auto found = common.parameters.find(node);
-    if (found == common.parameters.end()) continue;
-    merge(parameters, node == "/**" ? declared_only(found->second, config.type) : found->second);
-  }
+  Value::Map parameters = parameters_of(common, config.type, config.name, config.namespace_);
   merge(parameters, parameter_map(section.section("parameters")));
   config.parameters = Value(std::move(parameters));
   return config;
@@ -273,6 +280,12 @@ Result<std::string> substitute(const std::string& text, const std::string& name,
     at = close + 1;
   }
   return result.append(text, at, std::string::npos);
+}
+
+Result<Value::Map> load_parameters(const std::string& path, const std::string& type, const std::string& node) {
+  Common common;
+  if (Result<void> read = read_parameter_file(path, common); !read) return read.error();
+  return parameters_of(common, type, node, "/");
 }
 
 Result<Deployment> load_deployment(const std::string& path, const DeploymentOverrides& overrides) {

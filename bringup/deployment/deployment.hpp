@@ -40,6 +40,9 @@ struct DeploymentOverrides {
 // of one name, unknown component types, parameters and inputs that their component does not have.
 Result<Deployment> load_deployment(const std::string& path, const DeploymentOverrides& overrides = {});
 
+// The parameters that a ROS 2 parameter file gives to one component, as a deployment that names the file would.
+Result<Value::Map> load_parameters(const std::string& path, const std::string& type, const std::string& node);
+
 // Text with every ${...} replaced. An unknown name is an error with its line.
 Result<std::string> substitute(const std::string& text, const std::string& name,
                                const std::map<std::string, std::string>& variables);

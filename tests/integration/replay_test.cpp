@@ -48,6 +48,17 @@ TEST_P(Replay, RealSequenceBeatsTheStoredOdometryAndLosesNothing) {
   EXPECT_LT(error.translation().norm(), 0.3);                     // stored odometry: 1.1 m
   EXPECT_LT(so3_log(error.linear()).norm() * 180.0 / M_PI, 1.5);  // stored odometry: 5.9 degrees
 
+  // Offline, without DDS, on one thread: the same poses to the last bit.
+  const std::string config = folder.write("config.yaml", "/**:\n  ros__parameters: {mode: kiss, max_range: 80.0}\n");
+  const Output offline =
+      run_adit({"odometry", "lidar", "--input", data.string(), "--prior", (data / "maplab_lidar.tum").string(),
+                "--config", config, "--out", folder.file("offline.tum"), "--timing", folder.file("timing.csv")});
+  ASSERT_EQ(offline.exit_code, 0) << offline.text;
+  const Result<Trajectory> same = read_tum(folder.file("offline.tum"));
+  ASSERT_TRUE(same);
+  ASSERT_EQ(same->size(), estimate->size());
+  for (std::size_t i = 0; i < same->size(); ++i) EXPECT_EQ(tum_line((*same)[i]), tum_line((*estimate)[i]));
+
   const Output evaluate = run_adit({"evaluate", "--truth", (data / "ref_lidar.tum").string(), "--estimate",
                                     "lidar=" + folder.file("out/lidar.tum"), "--run", folder.file("run.json"), "--out",
                                     folder.file("report")});
