@@ -153,13 +153,14 @@ double Mapper::scale_offset(int slot, int* used) {
 Mapper::Report Mapper::add_keyframe(std::int64_t stamp_ns, const CameraState& state, Pyramid& image,
                                     const Rectifier& rectifier, const PoseHistory& history, bool lidar, float sigma) {
   Report report;
-  const std::span<const Pixel> pixels = selector_.select(image.level(0), rectifier);
+  const std::span<const Pixel> pixels = selector_.select(image, rectifier);
   report.selected = static_cast<int>(pixels.size());
   anchor_.project(lidar ? clouds_.at(stamp_ns, history) : std::span<const Eigen::Vector3f>{});
   for (const Pixel& pixel : pixels) report.anchored += anchor_.depth_at(pixel.u, pixel.v) ? 1 : 0;
   report.metric = report.anchored >= config_.min_points;
   const bool first = empty();
-  if (first && !report.metric) return report;
+  report.textured = textured() && report.selected >= config_.min_points;
+  if (first && (!report.metric || !report.textured)) return report;
   if (report.selected < config_.min_points / 3) return report;
 
   const int slot = window_.add_keyframe(stamp_ns, state, image);
@@ -197,7 +198,7 @@ Mapper::Report Mapper::start(std::int64_t first_stamp_ns, const CameraState& fir
                              Pyramid& image, const Rectifier& rectifier, float sigma) {
   Report report;
   clear();
-  const std::span<const Pixel> pixels = selector_.select(image.level(0), rectifier);
+  const std::span<const Pixel> pixels = selector_.select(image, rectifier);
   report.selected = static_cast<int>(pixels.size());
   const int host = window_.add_keyframe(first_stamp_ns, first, first_image);
   for (Patch patch : points) {

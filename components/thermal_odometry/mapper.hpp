@@ -24,6 +24,7 @@ class Mapper {
     int anchored_keyframes = 4;    // in the window
     int mono_keyframes = 6;        // at most max_keyframes - 1
     int anchored_views = 2;        // newest keyframes a frame is aligned to jointly; monocular: all
+    int min_texture = 100;         // grid cells with a strong gradient, to begin a map
     int min_points = 150;          // with LiDAR depth, for a keyframe that counts as anchored
     bool optimise = true;          // off, anchored mode: frame to keyframe alone
     float lidar_looseness = 5.0F;  // of the depth prior's sigma: absorbs a boresight error the pixels disagree with
@@ -40,6 +41,7 @@ class Mapper {
 
   struct Report {
     bool made = false;
+    bool textured = true;
     bool failed = false;  // the window broke: give the map up
     int selected = 0;
     int anchored = 0;
@@ -48,7 +50,8 @@ class Mapper {
     double log_scale_correction = 0.0;  // applied to the whole window about this keyframe
     float sigma = 0.0F;
   };
-  std::span<const Pixel> select(const Image& image, const Rectifier& rectifier) {
+  bool textured() const { return selector_.strong_cells() >= config_.min_texture; }  // of the image last selected from
+  std::span<const Pixel> select(const Pyramid& image, const Rectifier& rectifier) {
     return selector_.select(image, rectifier);
   }
 

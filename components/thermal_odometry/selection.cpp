@@ -22,7 +22,9 @@ PixelSelector::PixelSelector(int width, int height, const Config& config) : conf
   scratch_.reserve(static_cast<std::size_t>((width / 4 + 1) * (height / 4 + 1)));
 }
 
-std::span<const Pixel> PixelSelector::select(const Image& image, const Rectifier& rectifier) {
+std::span<const Pixel> PixelSelector::select(const Pyramid& pyramid, const Rectifier& rectifier) {
+  const Image& image = pyramid.level(0);
+  const Image& half = pyramid.level(std::min(1, pyramid.levels() - 1));
   const int border = config_.border;
   scratch_.clear();
   for (int y = border; y < image.height - border; y += 4) {
@@ -33,6 +35,11 @@ std::span<const Pixel> PixelSelector::select(const Image& image, const Rectifier
   std::nth_element(scratch_.begin(), decile, scratch_.end());
   threshold_ = std::max(config_.min_gradient, config_.noise_factor * std::sqrt(*decile) / 0.459F);
 
+  const float half_threshold2 = std::pow(std::max(config_.confirmation * threshold_, config_.min_confirmation), 2.0F);
+  const auto half_gradient2 = [&half](int x, int y) {
+    return gradient2(half, std::clamp(x / 2, 1, half.width - 2), std::clamp(y / 2, 1, half.height - 2));
+  };
+  strong_cells_ = 0;
   selected_.clear();
   const float threshold2 = threshold_ * threshold_;
   for (int y0 = border; y0 < image.height - border; y0 += cell_) {
@@ -42,16 +49,21 @@ std::span<const Pixel> PixelSelector::select(const Image& image, const Rectifier
       float best = threshold2;
       int best_x = -1;
       int best_y = -1;
+      bool strong = false;
       for (int y = y0; y < y1; ++y) {
         for (int x = x0; x < x1; ++x) {
           const float g2 = gradient2(image, x, y);
-          if (g2 > best) {
+          if (g2 <= threshold2) continue;
+          const float coarse = half_gradient2(x, y);
+          strong = strong || coarse > config_.strong * config_.strong;
+          if (g2 > best && coarse > half_threshold2) {
             best = g2;
             best_x = x;
             best_y = y;
           }
         }
       }
+      strong_cells_ += strong ? 1 : 0;
       if (best_x < 0 || !rectifier.covered(best_x, best_y)) continue;
       selected_.push_back({static_cast<float>(best_x), static_cast<float>(best_y), std::sqrt(best)});
     }

@@ -19,21 +19,28 @@ class PixelSelector {
  public:
   struct Config {
     int wanted = 500;
-    float min_gradient = 1.0F;  // noise units a pixel
-    float noise_factor = 4.5F;  // times the gradient noise measured in the flattest tenth of the image
-    int border = 8;             // px
+    float min_gradient = 1.0F;      // noise units a pixel
+    float noise_factor = 4.5F;      // times the gradient noise measured in the flattest tenth of the image
+    float confirmation = 0.7F;      // of the threshold, on level 1, and at least
+    float min_confirmation = 1.0F;  // noise units a level-1 pixel
+    float strong = 2.0F;            // level-1 gradient that noise and fixed patterns do not reach
+    int border = 8;                 // px
   };
   PixelSelector(int width, int height, const Config& config);
-  // The strongest gradient above the threshold in each grid cell. Rather few real points than many of noise: an image
-  // without texture gives next to none. The span is valid until the next call.
-  std::span<const Pixel> select(const Image& image, const Rectifier& rectifier);
+  // The strongest gradient above the threshold in each grid cell that the next level confirms: a bad pixel or a grain
+  // of fixed-pattern noise has no gradient there. Rather few real points than many of noise: an image without texture
+  // gives next to none. The span is valid until the next call.
+  std::span<const Pixel> select(const Pyramid& pyramid, const Rectifier& rectifier);
   // Threshold the last call used.
   float threshold() const { return threshold_; }
+  // Grid cells of the last call that hold a strong gradient: the measure of whether there is anything to see.
+  int strong_cells() const { return strong_cells_; }
 
  private:
   Config config_;
   int cell_;
   float threshold_ = 0.0F;
+  int strong_cells_ = 0;
   std::vector<Pixel> selected_;
   std::vector<float> scratch_;
 };

@@ -120,7 +120,7 @@ class ThermalOdometry::Engine {
       const Mapper::Report report =
           mapper_.add_keyframe(stamp_ns, {T_cw_, 0.0, 0.0}, current_, front_end_.rectifier(), history_, true, 1.5F);
       note(report);
-      if (report.selected < config_.mapper.min_points) out_.status = Status::low_texture;
+      if (!report.textured) out_.status = Status::low_texture;
       if (report.made) {
         begin_map(stamp_ns);
         return;
@@ -141,9 +141,9 @@ class ThermalOdometry::Engine {
       if (outcome == Initialiser::Outcome::done && start_map(stamp_ns)) return;
       initialiser_->stop();
     }
-    const std::span<const Pixel> pixels = mapper_.select(current_.level(0), front_end_.rectifier());
+    const std::span<const Pixel> pixels = mapper_.select(current_, front_end_.rectifier());
     out_.selected = static_cast<int>(pixels.size());
-    if (out_.selected < config_.mapper.min_points) {
+    if (out_.selected < config_.mapper.min_points || !mapper_.textured()) {
       out_.status = Status::low_texture;
       return;
     }

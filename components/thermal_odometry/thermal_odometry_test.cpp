@@ -112,6 +112,64 @@ TEST(ThermalOdometry, PriorLeadsThroughAFastTurn) {
       0.05);
 }
 
+TEST(ThermalOdometry, WithoutLidarTheScaleIsCarriedAndComesBack) {
+  Drive drive;
+  drive.speed = 3.0;
+  drive.first = TestScene::drive(0.0, drive.speed);
+  drive.lidar_to = 30;
+  drive.odometry = make(drive.scene);
+  for (int i = 0; i <= 30; ++i) drive.step(i);
+  EXPECT_EQ(drive.odometry->estimate().scale, ScaleState::metric);
+  double last_sigma = 0.0;
+  for (int i = 31; i < 120; ++i) {
+    const Estimate& estimate = drive.step(i);
+    ASSERT_EQ(estimate.status, Status::tracking) << "frame " << i;
+    last_sigma = estimate.log_scale_sigma;
+  }
+  EXPECT_EQ(drive.odometry->estimate().scale, ScaleState::carried);
+  EXPECT_GT(last_sigma, 0.005);
+  EXPECT_LT(drive.error(119), 0.03 * 89 * 0.04 * drive.speed + 0.03);
+  RecordProperty("outage_error_percent", std::to_string(100.0 * drive.error(119) / (89 * 0.04 * drive.speed)));
+  drive.lidar_from = 120;
+  drive.lidar_to = 1 << 30;
+  int metric = -1;
+  for (int i = 120; i < 146; ++i) {
+    if (drive.step(i).scale == ScaleState::metric && metric < 0) metric = i;
+  }
+  EXPECT_GE(metric, 120);
+  EXPECT_LE(metric, 145);  // within a second
+}
+
+TEST(ThermalOdometry, MonocularFindsTheShapeOfThePath) {
+  Drive drive;
+  drive.speed = 2.5;
+  drive.first = TestScene::drive(0.0, drive.speed);
+  drive.lidar_to = 0;
+  Config config;
+  config.mode = Mode::mono;
+  drive.odometry = make(drive.scene, config);
+  int first = -1;
+  int last = 0;
+  Pose at_first;
+  for (int i = 0; i < 90; ++i) {
+    const Estimate& estimate = drive.step(i);
+    EXPECT_NE(estimate.scale, ScaleState::metric);
+    if (estimate.status != Status::tracking) continue;
+    if (first < 0) {
+      first = i;
+      at_first = estimate.T_odom_camera;
+    }
+    last = i;
+  }
+  ASSERT_GE(first, 0);
+  EXPECT_LE(first, 15);
+  EXPECT_EQ(last, 89);
+  const Pose moved = at_first.inverse() * drive.odometry->estimate().T_odom_camera;
+  const Pose truth = drive.truth(first).inverse() * drive.truth(89);
+  const double scale = truth.translation().norm() / moved.translation().norm();
+  EXPECT_LT((scale * moved.translation() - truth.translation()).norm(), 0.02 * truth.translation().norm());
+}
+
 TEST(ThermalOdometry, NoTextureIsSaid) {
   Drive drive;
   drive.scene.contrast = 0.0;

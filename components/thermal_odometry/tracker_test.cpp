@@ -33,7 +33,7 @@ struct Bench {
   void set_key(const Pose& T_world_camera) {
     front_end.process(scene.render(T_world_camera, 0), key);
     patches.clear();
-    for (const Pixel& pixel : selector.select(key.level(0), front_end.rectifier())) {
+    for (const Pixel& pixel : selector.select(key, front_end.rectifier())) {
       const double depth = scene.depth(T_world_camera, pixel.u, pixel.v);
       if (depth > 60.0) continue;
       Patch patch{pixel.u, pixel.v, static_cast<float>(1.0 / depth), 0, 0, 0.0F, 0};
@@ -158,10 +158,10 @@ TEST(Tracker, RefusesPureNoise) {
 
 TEST(Selection, TakesGradientsAndLeavesNoise) {
   Bench bench;
-  EXPECT_GT(bench.selector.select(bench.key.level(0), bench.front_end.rectifier()).size(), 250U);
+  EXPECT_GT(bench.selector.select(bench.key, bench.front_end.rectifier()).size(), 250U);
   bench.scene.contrast = 0.0;
   bench.front_end.process(bench.scene.render(Pose::Identity(), 0), bench.key);
-  EXPECT_LT(bench.selector.select(bench.key.level(0), bench.front_end.rectifier()).size(), 40U);
+  EXPECT_LT(bench.selector.select(bench.key, bench.front_end.rectifier()).size(), 40U);
 }
 
 TEST(DepthAnchor, MeasuresTheWallsFromACloud) {

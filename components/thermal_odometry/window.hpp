@@ -106,6 +106,13 @@ class Window {
     int residuals = 0;
   };
   const Normal& linearise(bool only_marked, double depth_damping);
+  // What the last linearise() holds of one depth: H = 0 if nothing constrains it.
+  struct DepthBlock {
+    float H;
+    float g;
+    const Eigen::Matrix<float, dimension, 1>& coupling;
+  };
+  DepthBlock depth_block(std::size_t point) const { return {systems_[point].H, systems_[point].g, couplings_[point]}; }
   const Matrix& prior_H() const { return prior_H_; }
   const Vector& prior_g() const { return prior_g_; }
   // State vector: the deltas of all slots.
