@@ -1,11 +1,15 @@
+#include <sys/socket.h>
+
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <thread>
 
 #include "bringup/commands/command.hpp"
 #include "bringup/commands/deployment_options.hpp"
 #include "bringup/commands/process_status.hpp"
+#include "bringup/supervisor/supervisor.hpp"
 #include "components/runtime/process.hpp"
 #include "middleware/participant.hpp"
 
@@ -60,6 +64,42 @@ Result<void> apply_states(const std::vector<std::string>& states, ProcessConfig&
   return {};
 }
 
+// Tells the supervisor once when every link to the other processes is matched; a deployment may hold its sources back
+// until then, so that nothing of what they send is lost while the others still find each other.
+class LinkReporter {
+ public:
+  LinkReporter(const Process& process, ExpectedMatches expected) {
+    const char* const socket = std::getenv("ADIT_SUPERVISOR_FD");
+    if (!socket) return;
+    thread_ =
+        std::jthread([&process, expected = std::move(expected), fd = std::atoi(socket)](const std::stop_token& over) {
+          while (!over.stop_requested() && !complete(process, expected)) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+          }
+          if (!over.stop_requested()) ::send(fd, links_complete.data(), links_complete.size(), MSG_NOSIGNAL);
+        });
+  }
+
+ private:
+  static bool complete(const Process& process, const ExpectedMatches& expected) {
+    const auto matched = [](const std::map<std::string, std::uint32_t>& wanted, const std::string& topic,
+                            std::uint32_t is) {
+      const auto found = wanted.find(topic);
+      return found == wanted.end() || is >= found->second;
+    };
+    for (const ComponentStatus& component : process.status()) {
+      for (const InputStatus& input : component.inputs) {
+        if (!matched(expected.writers, input.topic, input.stats.link.matched)) return false;
+      }
+      for (const OutputStatus& output : component.outputs) {
+        if (!matched(expected.readers, output.topic, output.stats.link.matched)) return false;
+      }
+    }
+    return true;
+  }
+  std::jthread thread_;
+};
+
 Result<int> host(const Arguments& arguments) {
   const StopOnSignal stop;
   Result<Deployment> deployment = load_deployment(arguments.deployment.path, arguments.deployment.overrides());
@@ -76,7 +116,12 @@ Result<int> host(const Arguments& arguments) {
   if (!participant) return participant.error();
   if (Result<void> connected = (*process)->connect(*std::move(participant)); !connected) return connected.error();
   if (Result<void> started = (*process)->start(); !started) return started.error();
-  const int code = (*process)->run(stop.token());
+  Result<ExpectedMatches> expected = expected_matches(*deployment, arguments.process);
+  if (!expected) return expected.error();
+  const int code = [&] {
+    const LinkReporter reporter(**process, *std::move(expected));
+    return (*process)->run(stop.token());
+  }();
   if (!arguments.status_file.empty()) {
     if (Result<void> written = write_process_status(arguments.status_file, summarize(**process)); !written) {
       return written.error();

@@ -56,6 +56,7 @@ ChildSpec child_spec(const DeployedProcess& deployed, const Arguments& arguments
   for (const std::string& word : arguments.deployment.command_line()) spec.command.push_back(word);
   spec.environment = deployed.environment;
   spec.restart = deployed.restart;
+  spec.starts_when_linked = deployed.starts_when_linked;
   spec.stops_all = deployed.stops_all;
   spec.stop_timeout = deployed.stop_timeout;
   return spec;

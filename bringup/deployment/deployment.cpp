@@ -177,6 +177,7 @@ DeployedProcess read_process(const YamlSection& section, const Common& common) {
   process.use_sim_time = section.flag("use_sim_time", common.use_sim_time);
   process.executor = read_executor(section.section("executor"));
   deployed.restart = read_restart(section.section("restart"));
+  deployed.starts_when_linked = section.choice("start", {"now", "when_linked"}, "now") == "when_linked";
   deployed.stops_all = section.choice("when_done", {"nothing", "stop_all"}, "nothing") == "stop_all";
   deployed.stop_timeout = section.duration("stop_timeout", deployed.stop_timeout);
   const YamlSection environment = section.section("environment");
@@ -317,6 +318,19 @@ Result<Deployment> load_deployment(const std::string& path, const DeploymentOver
   if (Result<void> fine = document->finish(); !fine) return fine.error();
   if (Result<void> fine = check_components(deployment); !fine) return fine.error();
   return deployment;
+}
+
+Result<ExpectedMatches> expected_matches(const Deployment& deployment, const std::string& process) {
+  ExpectedMatches expected;
+  for (const DeployedProcess& deployed : deployment.processes) {
+    if (deployed.process.name == process || deployed.starts_when_linked) continue;
+    const Result<std::unique_ptr<Process>> built = Process::build(deployed.process);
+    if (!built) return built.error();
+    for (const PortInfo& port : (*built)->ports()) {
+      ++(port.direction == PortInfo::Direction::output ? expected.writers : expected.readers)[port.topic];
+    }
+  }
+  return expected;
 }
 
 Result<std::vector<std::string>> check_links(const Deployment& deployment) {

@@ -17,7 +17,8 @@ namespace adit {
 struct DeployedProcess {
   ProcessConfig process;
   RestartPolicy restart;
-  bool stops_all = false;  // when it ends well, the whole deployment is done (a player, a test)
+  bool starts_when_linked = false;  // a source: started when the links between all other processes are matched
+  bool stops_all = false;           // when it ends well, the whole deployment is done (a player, a test)
   Duration stop_timeout = std::chrono::seconds(5);  // from SIGTERM to SIGKILL
   std::map<std::string, std::string> environment;
 };
@@ -46,6 +47,14 @@ Result<Value::Map> load_parameters(const std::string& path, const std::string& t
 // Text with every ${...} replaced. An unknown name is an error with its line.
 Result<std::string> substitute(const std::string& text, const std::string& name,
                                const std::map<std::string, std::string>& variables);
+
+// How many endpoints of other processes (those that start at once) each port of `process` has to be matched with before
+// its links are complete, by topic.
+struct ExpectedMatches {
+  std::map<std::string, std::uint32_t> writers;  // for its inputs
+  std::map<std::string, std::uint32_t> readers;  // for its outputs
+};
+Result<ExpectedMatches> expected_matches(const Deployment& deployment, const std::string& process);
 
 // Ports of all components by process, without opening DDS: pairs on one topic whose types or QoS do not match, as
 // readable findings. Empty when everything fits.

@@ -86,6 +86,8 @@ void read_usage(pid_t pid, double& cpu_s, std::size_t& rss_bytes) {
 
 const char* to_string(ChildStatus::State state) {
   switch (state) {
+    case State::waiting_to_start:
+      return "waiting";
     case State::starting:
       return "starting";
     case State::running:
@@ -143,7 +145,11 @@ void Supervisor::observe(Duration period, Observer observer) {
 
 bool Supervisor::run(std::optional<Duration> limit) {
   if (limit) end_ = Steady::now() + *limit;
-  for (const auto& child : children_) start(*child);
+  constexpr auto longest_wait_for_links = std::chrono::seconds(15);
+  sources_at_ = Steady::now() + longest_wait_for_links;
+  for (const auto& child : children_) {
+    if (!child->spec.starts_when_linked) start(*child);
+  }
   while (!all_over()) {
     std::vector<pollfd> watched = {{signals_, POLLIN, 0}};
     for (const auto& child : children_) watched.push_back({child->reports, POLLIN, 0});  // poll skips negative ones
@@ -156,11 +162,26 @@ bool Supervisor::run(std::optional<Duration> limit) {
     }
     for (const auto& child : children_) read_reports(*child);
     collect_ended();
+    start_sources();
     check_times();
     if (stopping_) stop_next();
   }
   notify();
   return !failed_;
+}
+
+void Supervisor::start_sources() {
+  if (stopping_ || sources_at_ == Steady::time_point::max()) return;
+  const bool linked = std::all_of(children_.begin(), children_.end(), [](const auto& child) {
+    return child->spec.starts_when_linked || child->status.linked || child->over();
+  });
+  if (!linked && Steady::now() < sources_at_) return;
+  for (const auto& child : children_) {
+    if (child->status.state != State::waiting_to_start) continue;
+    if (!linked) log(child->spec.name + ": started although not every link of the other processes is matched");
+    start(*child);
+  }
+  sources_at_ = Steady::time_point::max();
 }
 
 void Supervisor::start(Child& child) {
@@ -188,6 +209,7 @@ void Supervisor::start(Child& child) {
   child.hung = false;
   child.status.pid = pid;
   child.status.state = State::starting;
+  child.status.linked = false;
   child.parser = {};
   if (pid < 0) {
     child.status.pid = 0;
@@ -207,6 +229,10 @@ void Supervisor::read_reports(Child& child) {
   char text[8192];
   for (ssize_t size = 0; (size = ::recv(child.reports, text, sizeof text, 0)) > 0;) {
     child.last_report = Steady::now();
+    if (std::string_view(text, static_cast<std::size_t>(size)) == links_complete) {
+      child.status.linked = true;
+      continue;
+    }
     if (child.status.report.number % 16 == 0) child.segments.merge(segments_of("/proc", "/dev/shm", child.status.pid));
     child.parser.feed({text, static_cast<std::size_t>(size)});
     while (std::optional<HeartbeatReport> report = child.parser.next()) child.status.report = *std::move(report);
@@ -310,7 +336,7 @@ void Supervisor::begin_stop(const std::string& why) {
   stopping_ = true;
   log("stopping: " + why);
   for (const auto& child : children_) {
-    if (child->status.state == State::waiting_to_restart) child->status.state = State::done;
+    if (!child->alive() && !child->over()) child->status.state = State::done;
   }
 }
 
@@ -330,7 +356,7 @@ void Supervisor::stop_next() {
 }
 
 Supervisor::Steady::time_point Supervisor::next_deadline() const {
-  auto next = std::min(next_observation_, stopping_ ? Steady::time_point::max() : end_);
+  auto next = std::min(next_observation_, stopping_ ? Steady::time_point::max() : std::min(end_, sources_at_));
   for (const auto& child : children_) {
     if (child->status.state == State::waiting_to_restart) next = std::min(next, child->restart_at);
     if (!child->alive()) continue;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "bringup/supervisor/restart_policy.hpp"
@@ -21,15 +22,17 @@ struct ChildSpec {
   std::vector<std::string> command;  // argv; the program by path
   std::map<std::string, std::string> environment;
   RestartPolicy restart;
+  bool starts_when_linked = false;  // started when all that start at once have reported their links complete
   bool stops_all = false;
   Duration stop_timeout = std::chrono::seconds(5);
 };
 
 struct ChildStatus {
-  enum class State { starting, running, waiting_to_restart, stopping, done, failed };
+  enum class State { waiting_to_start, starting, running, waiting_to_restart, stopping, done, failed };
   std::string name;
-  State state = State::starting;
-  pid_t pid = 0;  // 0: no process now
+  State state = State::waiting_to_start;
+  bool linked = false;  // has reported that its links are complete, since it was started
+  pid_t pid = 0;        // 0: no process now
   int restarts = 0;
   Duration uptime{};
   double cpu_s = 0.0;         // user + system, all runs of this child
@@ -38,6 +41,9 @@ struct ChildStatus {
   std::string last_end;       // "exit code 1", "killed by signal 9 (Killed)", "no heartbeat for 5 s"; empty: none yet
 };
 const char* to_string(ChildStatus::State state);
+
+// What a child sends, once, over its heartbeat socket when its links are complete.
+inline constexpr std::string_view links_complete = "linked\n";
 
 // Runs on one thread; blocks SIGCHLD, SIGINT and SIGTERM in it and takes them as events, so create it before other
 // threads are started. Children get SIGTERM when the supervisor itself dies.
@@ -71,6 +77,7 @@ class Supervisor {
   using Steady = std::chrono::steady_clock;
 
   void start(Child& child);
+  void start_sources();
   void collect_ended();
   void ended(Child& child, int wait_status);
   void read_reports(Child& child);
@@ -91,6 +98,7 @@ class Supervisor {
   Observer observer_;
   Duration period_{};
   Steady::time_point next_observation_ = Steady::time_point::max();
+  Steady::time_point sources_at_ = Steady::time_point::max();  // started then, linked or not
   Steady::time_point end_ = Steady::time_point::max();
 };
 

@@ -145,5 +145,16 @@ TEST_F(SupervisorTest, RestartMayChangeHowTheChildIsStarted) {
   EXPECT_TRUE(supervisor.run(10s));
 }
 
+TEST_F(SupervisorTest, SourcesStartWhenTheOthersAreLinked) {
+  ChildSpec source = script("source", "cp " + file("order") + " " + file("seen"));
+  source.starts_when_linked = true;
+  source.stops_all = true;
+  ChildSpec consumer = script("consumer", "sleep 0.2; echo linked > " + file("order") +
+                                              "; eval \"printf 'linked\\n' >&$ADIT_SUPERVISOR_FD\"; exec sleep 60");
+  Supervisor supervisor({source, consumer});
+  EXPECT_TRUE(supervisor.run(20s));
+  EXPECT_EQ(lines("seen"), 1u);
+}
+
 }  // namespace
 }  // namespace adit

@@ -25,17 +25,11 @@ void keep_message(png_structp png, png_const_charp message) {
 void ignore_warning(png_structp, png_const_charp) {}
 
 // The two functions below hold nothing but plain data between setjmp and longjmp; buffers belong to the caller.
-bool read_header(png_structp png, png_infop info, std::FILE* file, std::string& reason, Image16& image) {
+bool read_header(png_structp png, png_infop info, std::FILE* file) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_init_io(png, file);
   png_read_info(png, info);
-  image.width = png_get_image_width(png, info);
-  image.height = png_get_image_height(png, info);
-  if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16) {
-    reason = "not a 16-bit grey image (" + std::to_string(png_get_channels(png, info)) + " channels of " +
-             std::to_string(png_get_bit_depth(png, info)) + " bits): thermal data must not have been reduced to 8 bits";
-    return false;
-  }
+  if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16) return true;
   if (std::endian::native == std::endian::little) png_set_swap(png);
   png_read_update_info(png, info);
   return true;
@@ -79,8 +73,15 @@ Result<Image16> read_png16(const std::string& path) {
   png_infop info = png_create_info_struct(png);
   Image16 image;
   std::vector<png_bytep> rows;
-  bool done = read_header(png, info, file.get(), reason, image);
+  bool done = read_header(png, info, file.get());
+  if (done && (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16)) {
+    reason = "not a 16-bit grey image (" + std::to_string(png_get_channels(png, info)) + " channels of " +
+             std::to_string(png_get_bit_depth(png, info)) + " bits): thermal data must not have been reduced to 8 bits";
+    done = false;
+  }
   if (done) {
+    image.width = png_get_image_width(png, info);
+    image.height = png_get_image_height(png, info);
     image.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
     rows = row_pointers(image);
     done = read_rows(png, rows.data());
