@@ -79,6 +79,8 @@ TEST_P(Matching, IgnoreLocalKeepsAParticipantFromItself) {
   const auto own_reader = make_reader(*participant, config);
   const auto other_reader = make_reader(*elsewhere, endpoint("contract", Qos::reliable()));
   ASSERT_TRUE(wait_for_match(*writer, *other_reader));
+  // What the writer matched so far may be its own participant's reader.
+  ASSERT_TRUE(wait_until([&] { return writer->has_remote_readers(); }));
   Collector collector(*other_reader);
   for (unsigned n = 1; n <= 5; ++n) ASSERT_TRUE(writer->publish(Payload(64, n)));
   ASSERT_TRUE(collector.wait_for(5));
