@@ -9,6 +9,9 @@
 namespace adit::state_estimator {
 namespace {
 
+// A motion over a longer interval says nothing about the speed of now: it is not compared with other sensors'.
+constexpr double kComparable = 1.0;  // s
+
 double square(double value) {
   return value * value;
 }
@@ -168,7 +171,7 @@ Conversion to_measurement(const RelativeMotion& input, const OdometryConfig& con
     out.value << speed, yaw_rate, 0.0;
     keep_rates(rate_variance, config.fixed_noise ? Eigen::Vector2d(1e300, 1e300) : limits, out);
   }
-  out.motion.valid = true;
+  out.motion.valid = span <= kComparable;
   out.motion.has_speed = rate_variance(0) <= limits(0);
   out.motion.speed = speed;
   out.motion.speed_variance = rate_variance(0);
