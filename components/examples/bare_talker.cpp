@@ -1,4 +1,4 @@
-// Publishes std_msgs/String on /chatter ten times a second: adit_bare_talker [seconds] [domain].
+// Publishes std_msgs/String on /chatter: adit_bare_talker [seconds] [domain] [hertz].
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +12,7 @@
 int main(int argc, char** argv) {
   using namespace adit;
   const double seconds = argc > 1 ? std::atof(argv[1]) : 10.0;
+  const double hertz = argc > 3 ? std::atof(argv[3]) : 10.0;
   ParticipantConfig config;
   config.name = "bare_talker";
   if (argc > 2) config.domain = static_cast<std::uint32_t>(std::atoi(argv[2]));
@@ -31,12 +32,12 @@ int main(int argc, char** argv) {
     return 1;
   }
   std_msgs::msg::String message;
-  for (int i = 0; i < static_cast<int>(10 * seconds); ++i) {
+  for (int i = 0; i < static_cast<int>(hertz * seconds); ++i) {
     message.data = "Hello World: " + std::to_string(i);
     if (auto sent = (*writer)->publish(MessageEncoder(message)); !sent) {
       std::fprintf(stderr, "%s\n", sent.error().message.c_str());
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::this_thread::sleep_for(std::chrono::duration<double>(1.0 / hertz));
   }
   return 0;
 }

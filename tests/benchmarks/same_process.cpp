@@ -1,34 +1,20 @@
 // Same-process latency: publish() to handler, by size, beside a bare condition-variable wake-up in the same run.
-//   adit_runtime_latency [rounds]
-#include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <cstdio>
-#include <cstdlib>
 #include <mutex>
 #include <semaphore>
 #include <thread>
-#include <vector>
 
 #include "components/runtime/component.hpp"
 #include "components/runtime/testing/harness.hpp"
 #include "sensor_msgs/msg/image.hpp"
+#include "tests/benchmarks/bench.hpp"
 
+namespace adit::bench {
 namespace {
 
-using namespace adit;
 using Steady = std::chrono::steady_clock;
 using sensor_msgs::msg::Image;
-
-struct Figures {
-  double p50, p90;  // us
-};
-
-Figures figures(std::vector<double>& us) {
-  std::sort(us.begin(), us.end());
-  return {us[us.size() / 2], us[us.size() * 9 / 10]};
-}
 
 // One thread sleeps on a condition variable, another wakes it: what no delivery between threads can undercut.
 class BareWakeUp {
@@ -85,23 +71,25 @@ struct Sink final : Component {
                      }};
 };
 
-}  // namespace
+struct Figures {
+  std::vector<double> bare_us;
+  std::array<std::vector<double>, sizes.size()> us;
+};
 
-int main(int argc, char** argv) {
-  const int rounds = argc > 1 ? std::atoi(argv[1]) : 500;
-  const std::vector<std::size_t> sizes = {64, 1'000, 64'000, 1'000'000, 4'000'000};
+// Interleaved, so that what else runs on the machine meets all alike; paced, so that threads are asleep.
+Figures measure() {
+  const int rounds = settings().quick ? 10 : 500;
+  const int warm_up = settings().quick ? 5 : 20;
   testing::Harness harness(1);
   auto& source = harness.make<Source>("source");
   auto& sink = harness.make<Sink>("sink");
   harness.start();
   BareWakeUp bare;
-  std::vector<double> bare_us;
-  std::vector<std::vector<double>> us(sizes.size());
-  // Interleaved, so that what else runs on the machine meets all alike; paced, so that threads are asleep.
-  for (int i = -20; i < rounds; ++i) {
+  Figures figures;
+  for (int i = -warm_up; i < rounds; ++i) {
     std::this_thread::sleep_for(std::chrono::microseconds(500));
     const double bare_round = bare.round();
-    if (i >= 0) bare_us.push_back(bare_round);
+    if (i >= 0) figures.bare_us.push_back(bare_round);
     for (std::size_t s = 0; s < sizes.size(); ++s) {
       Loan<Image> loan = source.image.loan();
       loan->data.resize(sizes[s]);
@@ -109,14 +97,49 @@ int main(int argc, char** argv) {
       const auto start = Steady::now();
       source.image.publish(std::move(loan));
       sink.done.acquire();
-      if (i >= 0) us[s].push_back(std::chrono::duration<double, std::micro>(sink.woken - start).count());
+      if (i >= 0) figures.us[s].push_back(std::chrono::duration<double, std::micro>(sink.woken - start).count());
     }
   }
-  const Figures reference = figures(bare_us);
-  std::printf("%-28s p50 %7.2f us  p90 %7.2f us\n", "bare condition variable", reference.p50, reference.p90);
+  double lowest = 1e9, highest = 0;
+  const double bare_p50 = quantile(figures.bare_us, 0.5);
+  print_later("\nSame process, publish() to handler      p50 us   p90 us   p50 over bare us\n");
+  print_later("%-38s %7.2f  %7.2f\n", "bare condition-variable wake-up", bare_p50, quantile(figures.bare_us, 0.9));
   for (std::size_t s = 0; s < sizes.size(); ++s) {
-    const Figures f = figures(us[s]);
-    std::printf("publish to handler %9zu B p50 %7.2f us  p90 %7.2f us  p50 over bare %+.2f us\n", sizes[s], f.p50,
-                f.p90, f.p50 - reference.p50);
+    const double p50 = quantile(figures.us[s], 0.5);
+    lowest = std::min(lowest, p50);
+    highest = std::max(highest, p50);
+    print_later("%-38s %7.2f  %7.2f  %+7.2f\n", size_name(sizes[s]).c_str(), p50, quantile(figures.us[s], 0.9),
+                p50 - bare_p50);
+  }
+  print_later("slowest size / fastest size %.2f (goal <= 1.2; over bare <= 5 us)\n", highest / lowest);
+  return figures;
+}
+
+void report(benchmark::State& state, const std::vector<double>& us) {
+  for (auto _ : state) state.SetIterationTime(quantile(us, 0.5) * 1e-6);
+  state.counters["p90_us"] = quantile(us, 0.9);
+  state.counters["messages"] = static_cast<double>(us.size());
+}
+
+const Figures& figures() {
+  static const Figures measured = measure();
+  return measured;
+}
+
+}  // namespace
+
+void register_same_process() {
+  const auto add = [](const std::string& name, auto select) {
+    benchmark::RegisterBenchmark(("same_process/" + name).c_str(),
+                                 [select](benchmark::State& state) { report(state, select()); })
+        ->UseManualTime()
+        ->Iterations(1)
+        ->Unit(benchmark::kMicrosecond);
+  };
+  add("bare_wake_up", []() -> const std::vector<double>& { return figures().bare_us; });
+  for (std::size_t s = 0; s < sizes.size(); ++s) {
+    add(std::to_string(sizes[s]), [s]() -> const std::vector<double>& { return figures().us[s]; });
   }
 }
+
+}  // namespace adit::bench
