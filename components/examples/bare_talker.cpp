@@ -1,5 +1,6 @@
 // Publishes std_msgs/String on /chatter: adit_bare_talker [seconds] [domain] [hertz].
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -9,8 +10,15 @@
 #include "middleware/participant.hpp"
 #include "std_msgs/msg/string.hpp"
 
+namespace {
+
+volatile std::sig_atomic_t stop = 0;
+
+}  // namespace
+
 int main(int argc, char** argv) {
   using namespace adit;
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stop = 1; });
   const double seconds = argc > 1 ? std::atof(argv[1]) : 10.0;
   const double hertz = argc > 3 ? std::atof(argv[3]) : 10.0;
   ParticipantConfig config;
@@ -32,7 +40,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   std_msgs::msg::String message;
-  for (int i = 0; i < static_cast<int>(hertz * seconds); ++i) {
+  for (int i = 0; i < static_cast<int>(hertz * seconds) && !stop; ++i) {
     message.data = "Hello World: " + std::to_string(i);
     if (auto sent = (*writer)->publish(MessageEncoder(message)); !sent) {
       std::fprintf(stderr, "%s\n", sent.error().message.c_str());

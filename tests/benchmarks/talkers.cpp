@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 
 #include <condition_variable>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -91,6 +92,12 @@ pid_t start(const Talker& talker, double seconds, std::uint32_t domain, double h
              : -1;
 }
 
+void end(pid_t process) {
+  if (process <= 0) return;
+  kill(process, SIGTERM);
+  waitpid(process, nullptr, 0);
+}
+
 struct Figures {
   std::vector<double> start_ms;
   std::map<std::string, double> memory_mb;  // of /proc/PID/status
@@ -126,9 +133,9 @@ std::vector<Figures> measure(const std::vector<Talker>& talkers, const std::stri
       }
       listener.forget();
       const std::int64_t begin = monotonic_ns();
-      const pid_t process = start(talkers[i], 0.15, domain, 1000);
-      const std::int64_t heard = process > 0 ? listener.first(std::chrono::seconds(5)) : 0;
-      if (process > 0) waitpid(process, nullptr, 0);
+      const pid_t process = start(talkers[i], 10, domain, 1000);
+      const std::int64_t heard = process > 0 ? listener.first(std::chrono::seconds(10)) : 0;
+      end(process);
       if (heard == 0) {
         figures.failure = talkers[i].path + (process > 0 ? ": nothing heard" : " does not start");
       } else {
@@ -138,11 +145,11 @@ std::vector<Figures> measure(const std::vector<Talker>& talkers, const std::stri
   }
   for (std::size_t i = 0; i < talkers.size(); ++i) {
     if (!all[i].failure.empty()) continue;
-    const double seconds = settings().quick ? 0.4 : 1.5;
-    const pid_t process = start(talkers[i], seconds, domain, 10);
-    std::this_thread::sleep_for(std::chrono::duration<double>(seconds * 0.7));
+    const double seconds = settings().quick ? 0.3 : 1.0;
+    const pid_t process = start(talkers[i], 10, domain, 10);
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
     all[i].memory_mb = memory_of(process);
-    if (process > 0) waitpid(process, nullptr, 0);
+    end(process);
     std::error_code ignored;
     all[i].file_mb = static_cast<double>(fs::file_size(talkers[i].path, ignored)) * 1e-6;
   }

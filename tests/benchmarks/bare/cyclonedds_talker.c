@@ -1,11 +1,20 @@
 // std_msgs/String on /chatter, on Cyclone DDS alone: adit_bench_cyclonedds_talker SECONDS DOMAIN HERTZ.
 #include <dds/dds.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "chatter.h"
 
+static volatile sig_atomic_t stop = 0;
+static void on_signal(int number) {
+  (void)number;
+  stop = 1;
+}
+
 int main(int argc, char** argv) {
+  signal(SIGINT, on_signal);
+  signal(SIGTERM, on_signal);
   const double seconds = argc > 1 ? atof(argv[1]) : 10.0;
   const int domain = argc > 2 ? atoi(argv[2]) : 0;
   const double hertz = argc > 3 ? atof(argv[3]) : 10.0;
@@ -27,7 +36,7 @@ int main(int argc, char** argv) {
   if (writer < 0) return 1;
   char text[64];
   std_msgs_msg_dds__String_ message = {text};
-  for (int i = 0; i < (int)(hertz * seconds); ++i) {
+  for (int i = 0; i < (int)(hertz * seconds) && !stop; ++i) {
     snprintf(text, sizeof text, "Hello World: %d", i);
     dds_write(writer, &message);
     dds_sleepfor((dds_duration_t)(1e9 / hertz));

@@ -2,8 +2,10 @@
 // shared-memory segment is ours, so that memory is compared like with like.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <string>
 #include <thread>
@@ -16,9 +18,16 @@
 
 #include "tests/benchmarks/bare/fastdds_type.hpp"
 
+namespace {
+
+volatile std::sig_atomic_t stop = 0;
+
+}  // namespace
+
 int main(int argc, char** argv) {
   namespace dds = eprosima::fastdds::dds;
   namespace transport = eprosima::fastdds::rtps;
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stop = 1; });
   const double seconds = argc > 1 ? std::atof(argv[1]) : 10.0;
   const auto domain = static_cast<std::uint32_t>(argc > 2 ? std::atoi(argv[2]) : 0);
   const double hertz = argc > 3 ? std::atof(argv[3]) : 10.0;
@@ -29,6 +38,12 @@ int main(int argc, char** argv) {
   memory->segment_size(32u << 20);
   participant_qos.transport().use_builtin_transports = false;
   participant_qos.transport().user_transports = {memory, udp};
+  auto& builtin = participant_qos.wire_protocol().builtin;
+  builtin.discovery_config.initial_announcements = {5, {0, 10'000'000}};  // as ours
+  eprosima::fastrtps::rtps::Locator_t host;                               // unicast, as ours
+  host.kind = LOCATOR_KIND_UDPv4;
+  eprosima::fastrtps::rtps::IPLocator::setIPv4(host, "127.0.0.1");
+  builtin.initialPeersList.push_back(host);
   auto& factory = *dds::DomainParticipantFactory::get_instance();
   auto* const participant = factory.create_participant(domain, participant_qos);
   if (!participant) return 1;
@@ -42,7 +57,7 @@ int main(int argc, char** argv) {
   qos.data_sharing().off();
   auto* const writer = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT)->create_datawriter(topic, qos);
   if (!writer) return 1;
-  for (int i = 0; i < static_cast<int>(hertz * seconds); ++i) {
+  for (int i = 0; i < static_cast<int>(hertz * seconds) && !stop; ++i) {
     const std::string text = "Hello World: " + std::to_string(i);
     adit::bench::BytesType::Bytes bytes(text.c_str(), text.c_str() + text.size() + 1);
     writer->write(&bytes);
