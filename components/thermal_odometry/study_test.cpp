@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 
+#include "components/thermal_odometry/fuzzed_frames.hpp"
 #include "components/thermal_odometry/test_scene.hpp"
 #include "components/thermal_odometry/thermal_odometry.hpp"
 
@@ -124,6 +125,10 @@ TEST(Study, Outage) {
   const Figures f = show("no LiDAR for 50 m", {.frames = 340, .outage_from = 50, .outage_to = 300});
   EXPECT_LE(f.outage_percent, 3.0);
   EXPECT_EQ(f.measured, 339);
+}
+
+TEST(Study, TenThousandFuzzedFrames) {
+  survive_fuzzed_frames(10'000, 12);
 }
 
 }  // namespace
