@@ -90,7 +90,9 @@ Figures measure() {
     std::this_thread::sleep_for(std::chrono::microseconds(500));
     const double bare_round = bare.round();
     if (i >= 0) figures.bare_us.push_back(bare_round);
-    for (std::size_t s = 0; s < sizes.size(); ++s) {
+    for (std::size_t turn = 0; turn < sizes.size(); ++turn) {
+      // Each size comes first as often as the others: the first one after the bare round meets a cold cache.
+      const std::size_t s = (turn + static_cast<std::size_t>(i + warm_up)) % sizes.size();
       Loan<Image> loan = source.image.loan();
       loan->data.resize(sizes[s]);
       std::this_thread::sleep_for(std::chrono::microseconds(500));
