@@ -20,7 +20,8 @@ LoadFigures run_load(Link& link, std::size_t size, unsigned count, double rate) 
   std::thread taker([&] {
     Collector collector(*link.reader);
     while (figures.received < count) {
-      const bool more = collector.wait_for(1, done ? 2000ms : 100ms);
+      const bool all_sent = done;  // before the wait: one that began earlier is too short to be the last
+      const bool more = collector.wait_for(1, all_sent ? 2000ms : 100ms);
       for (const Sample& sample : collector.samples) {
         const std::chrono::duration<double, std::milli> latency =
             sample.info().received_time - sample.info().source_time;
@@ -30,7 +31,7 @@ LoadFigures run_load(Link& link, std::size_t size, unsigned count, double rate) 
         if (figures.received % 10 == 1 && !is_intact(sample.bytes(), size)) ++figures.damaged;
       }
       collector.samples.clear();
-      if (!more && done) break;
+      if (!more && all_sent) break;
     }
   });
   const auto period = std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(1.0 / rate));
