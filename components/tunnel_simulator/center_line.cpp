@@ -124,13 +124,18 @@ CenterLine CenterLine::parallel(double offset) const {
   LineStart start = start_;
   start.x -= offset * std::sin(start.heading);
   start.y += offset * std::cos(start.heading);
-  std::vector<LineElement> elements = elements_;
-  for (LineElement& e : elements) {
-    const double turn = 0.5 * e.length * (e.curvature_begin + e.curvature_end);
-    e.curvature_begin /= 1.0 - e.curvature_begin * offset;
-    e.curvature_end /= 1.0 - e.curvature_end * offset;
-    const double sum = e.curvature_begin + e.curvature_end;
-    if (std::abs(sum) > 1e-12) e.length = 2.0 * turn / sum;
+  const auto bent = [&](double curvature) { return curvature / (1.0 - curvature * offset); };
+  std::vector<LineElement> elements;
+  for (const LineElement& e : elements_) {
+    const int parts = e.curvature_begin == e.curvature_end ? 1 : 16;
+    double grade_blend = e.grade_blend;
+    for (int i = 0; i < parts; ++i) {
+      const double k0 = e.curvature_begin + (e.curvature_end - e.curvature_begin) * i / parts;
+      const double k1 = e.curvature_begin + (e.curvature_end - e.curvature_begin) * (i + 1) / parts;
+      const double length = e.length / parts - offset * 0.5 * (k0 + k1) * e.length / parts;
+      elements.push_back({length, bent(k0), bent(k1), e.grade, grade_blend});
+      grade_blend = 0.0;
+    }
   }
   return CenterLine(start, elements);
 }

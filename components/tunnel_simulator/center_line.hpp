@@ -38,7 +38,7 @@ struct LineCoordinates {
 
 class CenterLine {
  public:
-  CenterLine() = default;
+  CenterLine() : pieces_(1) {}  // along x from the origin, of no length
   CenterLine(const LineStart& start, const std::vector<LineElement>& elements);
 
   double length() const { return length_; }
@@ -48,12 +48,13 @@ class CenterLine {
   Eigen::Vector3d point(double s, double l, double h) const;
   // Nearest station in plan. Exact for points nearer than the radius of curvature.
   LineCoordinates project(const Eigen::Vector3d& point) const;
-  // The line at lateral distance `offset` (left positive): arcs exactly, clothoids by the clothoid of equal angle.
+  // The line at lateral distance `offset` (left positive): arcs exactly, clothoids in 16 parts, to a
+  // centimetre.
   CenterLine parallel(double offset) const;
 
  private:
   struct Piece {  // at most 2 m long, curvature and grade linear
-    double s, x, y, z, heading, curvature, curvature_rate, grade, grade_rate;
+    double s = 0, x = 0, y = 0, z = 0, heading = 0, curvature = 0, curvature_rate = 0, grade = 0, grade_rate = 0;
   };
   void append(double length, double k0, double k1, double g0, double g1);
   const Piece& piece_at(double s) const;

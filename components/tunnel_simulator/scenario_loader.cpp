@@ -49,7 +49,7 @@ void read_route(YamlMap map, const WorldDescription& world, bool imported, Scena
   }
   map.finish();
   if (scenario.route.empty()) map.fail("needs at least one leg", "legs");
-  if (imported || scenario.route.empty()) return;
+  if (!map.ok() || imported) return;
   // Every metre of the way must be inside; the leg or the bridge behind it is named.
   const World volumes(world);
   const Route all(scenario.route, scenario.closed);

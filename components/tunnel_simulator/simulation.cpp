@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "components/tunnel_simulator/mesh_import.hpp"
@@ -10,51 +11,9 @@
 
 namespace adit::tunnel_simulator {
 
-struct Simulation::Impl {
-  Scenario scenario;
-  int threads;
-  World world;
-  Route route;
-  Motion motion;
-  Atmosphere atmosphere;
-  Traffic traffic;
-  RayCaster caster;
-  Lidar lidar;
-  ThermalCamera thermal;
-  Imu imu;
-  Gnss gnss;
-  std::vector<std::array<Pose, 2>> movers;
-
-  Impl(Scenario s, World w, int thread_count)
-      : scenario(std::move(s)),
-        threads(thread_count),
-        world(std::move(w)),
-        route(scenario.route, scenario.closed),
-        motion(scenario.motion, route, scenario.duration + 1.0, scenario.seed),
-        traffic(scenario.traffic),
-        caster(world, {scenario.view_radius, scenario.thermal_on, threads},
-               traffic.meshes(world.description().texture >= 3)),
-        lidar(scenario.lidar, scenario.seed),
-        thermal(scenario.thermal, scenario.seed),
-        imu(scenario.imu, scenario.seed),
-        gnss(scenario.gnss, world.description().origin, scenario.seed) {
-    for (const Smoke& smoke : scenario.smoke) {
-      const std::size_t i = world.find(smoke.tube);
-      if (i >= world.description().volumes.size()) continue;  // the loader has refused it
-      const VolumeDescription& v = world.description().volumes[i];
-      atmosphere.add_along(v.line, smoke.from, smoke.to, smoke.ramp, smoke.kind, smoke.visibility,
-                           v.profile.width() + 2.0, v.profile.max().y());
-    }
-  }
-
-  void look(double begin, double end, const Pose& from) {
-    caster.look_from(from.translation());
-    traffic.poses(begin, end, movers);
-    caster.move(movers);
-  }
-};
-
 namespace {
+
+constexpr std::size_t kTruth = kSensors;
 
 // When and how samples of one sensor are handed on.
 class Courier {
@@ -99,6 +58,73 @@ class Courier {
 };
 
 }  // namespace
+
+struct Simulation::Impl {
+  Scenario scenario;
+  int threads;
+  World world;
+  Route route;
+  Motion motion;
+  Atmosphere atmosphere;
+  Traffic traffic;
+  RayCaster caster;
+  Lidar lidar;
+  ThermalCamera thermal;
+  Imu imu;
+  Gnss gnss;
+  std::vector<std::array<Pose, 2>> movers;
+  std::array<Courier, kSensors> couriers;
+  // The streams: one a sensor, and the truth.
+  std::array<double, kSensors + 1> period, span;  // between samples; of one measurement [s]
+  std::array<bool, kSensors + 1> on;
+  std::array<std::uint64_t, kSensors + 1> index{};
+  LidarScan scan;
+  ThermalImage image;
+
+  Impl(Scenario s, World w, int thread_count)
+      : scenario(std::move(s)),
+        threads(thread_count),
+        world(std::move(w)),
+        route(scenario.route, scenario.closed),
+        motion(scenario.motion, route, scenario.duration + 1.0, scenario.seed),
+        traffic(scenario.traffic),
+        caster(world, {scenario.view_radius, scenario.thermal_on, threads},
+               traffic.meshes(world.description().texture >= 3)),
+        lidar(scenario.lidar, scenario.seed),
+        thermal(scenario.thermal, scenario.seed),
+        imu(scenario.imu, scenario.seed),
+        gnss(scenario.gnss, world.description().origin, scenario.seed),
+        couriers{Courier(scenario, Sensor::lidar), Courier(scenario, Sensor::thermal), Courier(scenario, Sensor::imu),
+                 Courier(scenario, Sensor::gnss)},
+        period{1.0 / scenario.lidar.rate, 1.0 / scenario.thermal.rate, 1.0 / scenario.imu.rate,
+               1.0 / scenario.gnss.rate, 0.01},
+        span{period[0], 2.0 * thermal.half_readout(), 0.0, 0.0, 0.0},
+        on{scenario.lidar_on, scenario.thermal_on, scenario.imu_on, scenario.gnss_on, true} {
+    for (const Smoke& smoke : scenario.smoke) {
+      const std::size_t i = world.find(smoke.tube);
+      if (i >= world.description().volumes.size()) continue;  // the loader has refused it
+      const VolumeDescription& v = world.description().volumes[i];
+      atmosphere.add_along(v.line, smoke.from, smoke.to, smoke.ramp, smoke.kind, smoke.visibility,
+                           v.profile.width() + 2.0, v.profile.max().y());
+    }
+  }
+
+  // The stream whose sample is ready first, and when.
+  std::pair<std::size_t, double> next() const {
+    std::pair<std::size_t, double> first{kTruth, std::numeric_limits<double>::infinity()};
+    for (std::size_t i = 0; i <= kTruth; ++i) {
+      const double end = static_cast<double>(index[i]) * period[i] + span[i];
+      if (on[i] && end <= scenario.duration + 1e-9 && end < first.second - 1e-9) first = {i, end};
+    }
+    return first;
+  }
+
+  void look(double begin, double end, const Pose& from) {
+    caster.look_from(from.translation());
+    traffic.poses(begin, end, movers);
+    caster.move(movers);
+  }
+};
 
 Simulation::Simulation(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Simulation::~Simulation() = default;
@@ -150,78 +176,60 @@ Pose Simulation::thermal(double time) const {
   return base(time) * impl_->scenario.rig.thermal;
 }
 
-void Simulation::run(Sink& sink, double duration) {
+double Simulation::ready() const {
+  return impl_->next().second;
+}
+
+void Simulation::run(Sink& sink, double until) {
+  while (!sink.stop() && ready() <= until + 1e-9) step(sink);
+}
+
+void Simulation::step(Sink& sink) {
   Impl& d = *impl_;
-  const Scenario& s = d.scenario;
-  duration = std::min(duration, s.duration);
-  const double readout = 2.0 * d.thermal.half_readout();
-  std::array<Courier, kSensors> couriers{Courier(s, Sensor::lidar), Courier(s, Sensor::thermal),
-                                         Courier(s, Sensor::imu), Courier(s, Sensor::gnss)};
-  constexpr std::size_t truth = kSensors;
-  const std::array<double, kSensors + 1> period{1.0 / s.lidar.rate, 1.0 / s.thermal.rate, 1.0 / s.imu.rate,
-                                                1.0 / s.gnss.rate, 0.01};
-  const std::array<double, kSensors + 1> span{period[0], readout, 0.0, 0.0, 0.0};  // of one measurement
-  const std::array<bool, kSensors + 1> on{s.lidar_on, s.thermal_on, s.imu_on, s.gnss_on, true};
-  std::array<std::uint64_t, kSensors + 1> index{};
-  LidarScan scan;
-  ThermalImage image;
-  const std::int64_t epoch_ns = std::llround(s.epoch * 1e9);
-  while (!sink.stop()) {
-    std::size_t next = truth;
-    double ready = duration + 1.0;
-    for (std::size_t i = 0; i <= kSensors; ++i) {
-      const double end = static_cast<double>(index[i]) * period[i] + span[i];
-      if (on[i] && end < ready - 1e-9) {
-        ready = end;
-        next = i;
+  const auto [stream, ready] = d.next();
+  if (!std::isfinite(ready)) return;
+  const std::uint64_t k = d.index[stream]++;
+  const double begin = static_cast<double>(k) * d.period[stream];
+  if (stream == kTruth) {
+    sink.on_truth(d.scenario.epoch + begin, base(begin));
+    return;
+  }
+  const auto sensor = static_cast<Sensor>(stream);
+  const double time = begin + (sensor == Sensor::thermal ? 0.5 * d.span[stream] : 0.0);
+  const Courier::Verdict verdict = d.couriers[stream].decide(k, time, ready);
+  switch (sensor) {
+    case Sensor::lidar:
+      if (verdict.render && verdict.deliver) {
+        d.look(begin, begin + d.period[stream], lidar(begin + 0.5 * d.period[stream]));
+        d.lidar.sweep(
+            d.caster, d.atmosphere, [this](double t) { return lidar(t); }, begin, k, d.threads, d.scan);
       }
+      d.scan.stamp_ns = verdict.delivery.stamp_ns;
+      if (verdict.deliver && !d.scan.ranges.empty()) sink.on_lidar(d.scan, verdict.delivery);
+      break;
+    case Sensor::thermal:
+      if (verdict.render) {  // lost frames too: a closed shutter repeats the one before
+        d.look(begin, begin + std::max(d.span[stream], 1e-3), thermal(begin));
+        d.thermal.capture(
+            d.caster, d.atmosphere, [this](double t) { return thermal(t); }, begin, k, d.threads, d.image);
+      }
+      d.image.stamp_ns = verdict.delivery.stamp_ns;
+      if (verdict.deliver && !d.image.counts.empty()) sink.on_thermal(d.image, verdict.delivery);
+      break;
+    case Sensor::imu: {
+      ImuSample sample = d.imu.sample([&](double t) { return base(t) * d.scenario.rig.imu; }, begin, k);
+      sample.stamp_ns = verdict.delivery.stamp_ns;
+      if (verdict.deliver) sink.on_imu(sample, verdict.delivery);
+      break;
     }
-    if (ready > duration + 1e-9) break;
-    const std::uint64_t k = index[next]++;
-    const double begin = static_cast<double>(k) * period[next];
-    if (next == truth) {
-      sink.on_truth(s.epoch + begin, base(begin));
-      continue;
-    }
-    const double time = next == static_cast<std::size_t>(Sensor::thermal) ? begin + 0.5 * readout : begin;
-    const Courier::Verdict verdict = couriers[next].decide(k, time, ready);
-    const bool imu_like = next >= static_cast<std::size_t>(Sensor::imu);
-    if (!verdict.render && !verdict.deliver && !imu_like) continue;
-    switch (static_cast<Sensor>(next)) {
-      case Sensor::lidar:
-        if (verdict.render && verdict.deliver) {
-          d.look(begin, begin + period[next], lidar(begin + 0.5 * period[next]));
-          d.lidar.sweep(
-              d.caster, d.atmosphere, [this](double t) { return lidar(t); }, begin, k, d.threads, scan);
-        }
-        scan.stamp_ns = verdict.delivery.stamp_ns;
-        if (verdict.deliver && !scan.ranges.empty()) sink.on_lidar(scan, verdict.delivery);
-        break;
-      case Sensor::thermal:
-        if (verdict.render) {
-          d.look(begin, begin + std::max(readout, 1e-3), thermal(begin));
-          d.thermal.capture(
-              d.caster, d.atmosphere, [this](double t) { return thermal(t); }, begin, k, d.threads, image);
-        }
-        image.stamp_ns = verdict.delivery.stamp_ns;
-        if (verdict.deliver && !image.counts.empty()) sink.on_thermal(image, verdict.delivery);
-        break;
-      case Sensor::imu: {
-        ImuSample sample = d.imu.sample([&](double t) { return base(t) * s.rig.imu; }, begin, k);
-        sample.stamp_ns = verdict.delivery.stamp_ns;
-        if (verdict.deliver) sink.on_imu(sample, verdict.delivery);
-        break;
-      }
-      case Sensor::gnss: {
-        const Eigen::Vector3d antenna = base(begin) * s.rig.antenna;
-        GnssSample sample = d.gnss.sample(antenna, d.world.depth_from_portal(antenna), begin, k);
-        sample.stamp_ns = verdict.delivery.stamp_ns;
-        if (verdict.deliver) sink.on_gnss(sample, verdict.delivery);
-        break;
-      }
+    case Sensor::gnss: {
+      const Eigen::Vector3d antenna = base(begin) * d.scenario.rig.antenna;
+      GnssSample sample = d.gnss.sample(antenna, d.world.depth_from_portal(antenna), begin, k);
+      sample.stamp_ns = verdict.delivery.stamp_ns;
+      if (verdict.deliver) sink.on_gnss(sample, verdict.delivery);
+      break;
     }
   }
-  (void)epoch_ns;
 }
 
 }  // namespace adit::tunnel_simulator

@@ -44,8 +44,11 @@ class Simulation {
   Pose lidar(double time) const;
   Pose thermal(double time) const;
 
-  // From the start to `duration` seconds (at most the scenario's).
-  void run(Sink& sink, double duration);
+  // Makes samples up to `until` seconds (at most the scenario's duration) and goes on where the last call stopped.
+  void run(Sink& sink, double until);
+  // Makes the next sample. When it is ready [s], or +inf at the end of the scenario, is `ready()`.
+  void step(Sink& sink);
+  double ready() const;
 
  private:
   struct Impl;

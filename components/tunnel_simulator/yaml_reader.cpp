@@ -84,6 +84,8 @@ YamlMap::YamlMap(YamlDocument& document, const YAML::Node& node, std::string wha
 YamlMap::~YamlMap() = default;
 YamlMap::YamlMap(YamlMap&&) noexcept = default;
 
+bool YamlMap::ok() const { return document_->ok(); }
+
 bool YamlMap::has(const std::string& key) const {
   if (!node_->IsDefined() || !node_->IsMap()) return false;
   for (const auto& entry : *node_) {

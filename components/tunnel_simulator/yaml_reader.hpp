@@ -42,6 +42,8 @@ class YamlMap {
   void require(const std::string& key);
   // Reports keys that no getter asked for.
   void finish();
+  // Nothing wrong so far, in the whole document.
+  bool ok() const;
   // Reports a mistake at this map, or at one of its keys.
   void fail(const std::string& message, const std::string& key = "");
 
