@@ -34,6 +34,22 @@ struct Picture {
         set(static_cast<int>(std::lround(x)) + dx, static_cast<int>(std::lround(y)) + dy, color);
     }
   }
+  // Means of 2 x 2 pixels.
+  Picture halved() const {
+    Picture half(width / 2, height / 2, {0, 0, 0});
+    for (int y = 0; y < half.height; ++y) {
+      for (int x = 0; x < half.width; ++x) {
+        std::array<std::uint8_t, 3> mean{};
+        for (std::size_t c = 0; c < 3; ++c) {
+          const auto at = [&](int px, int py) { return rgb[3 * static_cast<std::size_t>(py * width + px) + c]; };
+          mean[c] = static_cast<std::uint8_t>(
+              (at(2 * x, 2 * y) + at(2 * x + 1, 2 * y) + at(2 * x, 2 * y + 1) + at(2 * x + 1, 2 * y + 1)) / 4);
+        }
+        half.set(x, y, mean);
+      }
+    }
+    return half;
+  }
   bool write(const std::string& path) const {
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
@@ -156,6 +172,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Draws what a scenario looks like"};
   std::string path, out, what = "thermal";
   double time = 10.0, low = 0.5, high = 99.5;
+  bool half = false;
+  int texture = -1;
   app.add_option("scenario", path, "scenario file")->required();
   app.add_option("--out", out, "PNG file")->required();
   app.add_option("--what", what, "thermal, above, inside or map")
@@ -163,8 +181,11 @@ int main(int argc, char** argv) {
   app.add_option("--time", time, "seconds after the start");
   app.add_option("--low", low, "percentile shown black");
   app.add_option("--high", high, "percentile shown white");
+  app.add_flag("--half", half, "half the size");
+  app.add_option("--texture", texture, "0 to 3 instead of the scenario's level");
   CLI11_PARSE(app, argc, argv);
   auto scenario = load_scenario(path);
+  if (scenario && texture >= 0) scenario->world.texture = texture;
   auto simulation = scenario ? Simulation::create(std::move(*scenario), 1) : scenario.error();
   if (!simulation) {
     std::fprintf(stderr, "%s\n", simulation.error().message.c_str());
@@ -174,7 +195,7 @@ int main(int argc, char** argv) {
                           : what == "above"  ? above(**simulation, time)
                           : what == "inside" ? inside(**simulation, time)
                                              : map(**simulation);
-  if (picture.write(out)) return 0;
+  if ((half ? picture.halved() : picture).write(out)) return 0;
   std::fprintf(stderr, "%s: cannot be written\n", out.c_str());
   return 1;
 }

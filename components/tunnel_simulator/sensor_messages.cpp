@@ -22,7 +22,9 @@ namespace {
 
 constexpr bool kBigEndian = std::endian::native == std::endian::big;
 
-builtin_interfaces::msg::Time stamp_of(std::int64_t nanoseconds) { return to_stamp(Time(Duration(nanoseconds))); }
+builtin_interfaces::msg::Time stamp_of(std::int64_t nanoseconds) {
+  return to_stamp(Time(Duration(nanoseconds)));
+}
 
 std::int64_t first_row_ns(const Delivery& delivery, const Scenario& scenario) {
   const ThermalConfig& c = scenario.thermal;
@@ -47,19 +49,17 @@ Result<void> fill(const LidarScan& scan, const Delivery& delivery, sensor_msgs::
   for (std::size_t i = 0; i < points.size(); ++i) {
     const bool seen = scan.ranges[i] > 0.0F;
     const Eigen::Vector3f& p = scan.points[i];
-    points[i] = {seen ? p.x() : none,
-                 seen ? p.y() : none,
-                 seen ? p.z() : none,
-                 scan.reflectivity[i],
-                 1e-9 * scan.time_ns[i],
-                 static_cast<std::uint16_t>(i / static_cast<std::size_t>(scan.columns))};
+    points[i] = {seen ? p.x() : none,    seen ? p.y() : none,
+                 seen ? p.z() : none,    scan.reflectivity[i],
+                 1e-9 * scan.time_ns[i], static_cast<std::uint16_t>(i / static_cast<std::size_t>(scan.columns))};
   }
   out.header.stamp = stamp_of(delivery.stamp_ns);
   out.header.frame_id = "lidar";
   return write_points(points, static_cast<std::uint32_t>(scan.rings), PointLayout::ouster, out);
 }
 
-void fill(const ThermalImage& image, const Delivery& delivery, const Scenario& scenario, adit_msgs::msg::ThermalFrame& out) {
+void fill(const ThermalImage& image, const Delivery& delivery, const Scenario& scenario,
+          adit_msgs::msg::ThermalFrame& out) {
   const ThermalConfig& c = scenario.thermal;
   out.header.stamp = stamp_of(first_row_ns(delivery, scenario));
   out.header.frame_id = "thermal_optical";

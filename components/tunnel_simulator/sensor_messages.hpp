@@ -27,7 +27,8 @@ namespace adit::tunnel_simulator {
 // Ouster's field layout, organized: one row a ring; missing returns are NaN.
 Result<void> fill(const LidarScan& scan, const Delivery& delivery, sensor_msgs::msg::PointCloud2& out);
 // Header stamp: the first row, as adit_msgs/ThermalFrame wants it (delivery.stamp_ns is the middle of the readout).
-void fill(const ThermalImage& image, const Delivery& delivery, const Scenario& scenario, adit_msgs::msg::ThermalFrame& out);
+void fill(const ThermalImage& image, const Delivery& delivery, const Scenario& scenario,
+          adit_msgs::msg::ThermalFrame& out);
 void fill(const ThermalImage& image, const Delivery& delivery, const Scenario& scenario, sensor_msgs::msg::Image& out);
 void fill_camera_info(const Delivery& delivery, const Scenario& scenario, sensor_msgs::msg::CameraInfo& out);
 void fill(const ImuSample& sample, const ImuConfig& config, sensor_msgs::msg::Imu& out);

@@ -84,7 +84,9 @@ YamlMap::YamlMap(YamlDocument& document, const YAML::Node& node, std::string wha
 YamlMap::~YamlMap() = default;
 YamlMap::YamlMap(YamlMap&&) noexcept = default;
 
-bool YamlMap::ok() const { return document_->ok(); }
+bool YamlMap::ok() const {
+  return document_->ok();
+}
 
 bool YamlMap::has(const std::string& key) const {
   if (!node_->IsDefined() || !node_->IsMap()) return false;
