@@ -28,7 +28,6 @@ std::optional<Eigen::Vector2d> CameraModel::undistort(const Eigen::Vector2d& dis
   Eigen::Vector2d p = distorted;
   for (int i = 0; i < 50; ++i) {
     const Eigen::Vector2d error = distort(p) - distorted;
-    if (error.squaredNorm() < 1e-24) return p;
     const double x = p.x(), y = p.y();
     const double r2 = x * x + y * y;
     const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -36,6 +35,11 @@ std::optional<Eigen::Vector2d> CameraModel::undistort(const Eigen::Vector2d& dis
     Eigen::Matrix2d jacobian;
     jacobian << radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y,
         x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
+    if (error.squaredNorm() < 1e-24) {
+      // Beyond the fold of a strong model lie further roots, turned over: not what a lens shows.
+      const bool upright = radial > 0.0 && jacobian.determinant() > 0.0;
+      return upright ? std::optional(p) : std::nullopt;
+    }
     if (std::abs(jacobian.determinant()) < 1e-6) return std::nullopt;
     p -= jacobian.inverse() * error;
   }

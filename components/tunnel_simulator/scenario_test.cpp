@@ -234,7 +234,7 @@ TEST_F(BadScenario, IsRefusedWithFileAndLine) {
   expect("arc: 50, radius: 200", "arc: 50", "w.yaml:8", "'radius' is missing");
   expect("caps: [begin, end]", "caps: [begin, middle]", "w.yaml:9", "begin and end");
   expect("kind: road", "kind: road\n    kind: rail", "w.yaml:5", "twice");
-  expect("name: w", "name: [w", "w.yaml:", "");
+  expect("name: w", "name: [w", "w.yaml:2", "flow");
   expect("speed: 36 km/h}", "speed: 36 km/h}\noutages:\n  - {sensor: radar, from: 1, duration: 2}", "s.yaml:10",
          "expected one of lidar");
   expect("speed: 36 km/h}", "speed: 36 km/h}\nsensors:\n  thermal: {rate: 60, row_time: 100 us}", "s.yaml:10",
