@@ -156,6 +156,7 @@ class TunnelSimulatorComponent final : public Component, private sim::Sink {
                              (unanswered_ > 0 ? ", " + std::to_string(unanswered_) + " unanswered" : "");
     health(unanswered_ > 0 ? Health::warn : Health::ok, text);
     log().info("{}: {}", simulation_->scenario().name, text);
+    finish();
   }
 
   void answered(Consumer& consumer, const Odometry& message) {
