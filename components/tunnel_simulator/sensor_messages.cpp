@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "adit_msgs/msg/thermal_frame.hpp"
-#include "components/runtime/stamp.hpp"
 #include "idl/point_cloud_writer.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/camera_info.hpp"
@@ -23,7 +23,11 @@ namespace {
 constexpr bool kBigEndian = std::endian::native == std::endian::big;
 
 builtin_interfaces::msg::Time stamp_of(std::int64_t nanoseconds) {
-  return to_stamp(Time(Duration(nanoseconds)));
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(std::chrono::nanoseconds(nanoseconds));
+  builtin_interfaces::msg::Time stamp;
+  stamp.sec = static_cast<std::int32_t>(seconds.count());
+  stamp.nanosec = static_cast<std::uint32_t>((std::chrono::nanoseconds(nanoseconds) - seconds).count());
+  return stamp;
 }
 
 std::int64_t first_row_ns(const Delivery& delivery, const Scenario& scenario) {
