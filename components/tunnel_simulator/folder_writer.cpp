@@ -1,7 +1,5 @@
 #include "components/tunnel_simulator/folder_writer.hpp"
 
-#include <png.h>
-
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -31,37 +29,6 @@ void write_matrix(std::ostream& out, const char* name, const Pose& pose) {
 }
 
 }  // namespace
-
-Result<void> write_png16(const std::string& path, int width, int height, const std::vector<std::uint16_t>& pixels) {
-  std::FILE* file = std::fopen(path.c_str(), "wb");
-  if (file == nullptr) return Error{ErrorCode::io, path + ": cannot be written"};
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png_create_info_struct(png);
-  std::vector<png_bytep> rows;
-  std::vector<std::uint8_t> bytes(pixels.size() * 2);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    bytes[2 * i] = static_cast<std::uint8_t>(pixels[i] >> 8U);
-    bytes[2 * i + 1] = static_cast<std::uint8_t>(pixels[i] & 0xffU);
-  }
-  for (int y = 0; y < height; ++y)
-    rows.push_back(bytes.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width) * 2);
-  if (setjmp(png_jmpbuf(png)) != 0) {  // libpng's way to report a write error
-    png_destroy_write_struct(&png, &info);
-    std::fclose(file);
-    return Error{ErrorCode::io, path + ": writing failed"};
-  }
-  png_init_io(png, file);
-  png_set_compression_level(png, 1);
-  png_set_filter(png, 0, PNG_FILTER_SUB);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 16, PNG_COLOR_TYPE_GRAY,
-               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  png_write_info(png, info);
-  png_write_image(png, rows.data());
-  png_write_end(png, nullptr);
-  png_destroy_write_struct(&png, &info);
-  if (std::fclose(file) != 0) return Error{ErrorCode::io, path + ": writing failed"};
-  return {};
-}
 
 Result<std::unique_ptr<FolderWriter>> FolderWriter::open(const std::string& folder, const Simulation& simulation) {
   std::error_code failed;
@@ -126,23 +93,21 @@ Result<void> FolderWriter::write_calibration() {
 }
 
 void FolderWriter::on_lidar(const LidarScan& scan, const Delivery& delivery) {
-  buffer_.clear();
+  cloud_.values.clear();
   for (int c = 0; c < scan.columns; ++c) {  // in the order of time
     for (int r = 0; r < scan.rings; ++r) {
       const std::size_t i =
           static_cast<std::size_t>(r) * static_cast<std::size_t>(scan.columns) + static_cast<std::size_t>(c);
       if (scan.ranges[i] <= 0.0F) continue;
       const Eigen::Vector3f& p = scan.points[i];
-      buffer_.insert(buffer_.end(), {p.x(), p.y(), p.z(), scan.reflectivity[i],
-                                     1e-9F * static_cast<float>(scan.time_ns[i]), static_cast<float>(r)});
+      cloud_.values.insert(cloud_.values.end(), {p.x(), p.y(), p.z(), scan.reflectivity[i],
+                                                 1e-9F * static_cast<float>(scan.time_ns[i]), static_cast<float>(r)});
     }
   }
   const std::string name = numbered(scans_++, ".bin");
-  std::ofstream out(folder_ + "/scans/" + name, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(buffer_.data()),
-            static_cast<std::streamsize>(buffer_.size() * sizeof(float)));
-  if (!out) error_ = Error{ErrorCode::io, folder_ + "/scans/" + name + ": writing failed"};
-  scan_index_ << name << ' ' << delivery.stamp_ns << ' ' << buffer_.size() / 6 << '\n';
+  cloud_.points = cloud_.values.size() / 6;
+  if (auto written = dataset::write_bin(folder_ + "/scans/" + name, cloud_); !written) error_ = written.error();
+  scan_index_ << name << ' ' << delivery.stamp_ns << ' ' << cloud_.points << '\n';
   const Scenario& s = simulation_.scenario();
   const double begin = delivery.time - s.epoch;
   const double sweep = 1.0 / s.lidar.rate;
@@ -153,7 +118,10 @@ void FolderWriter::on_lidar(const LidarScan& scan, const Delivery& delivery) {
 
 void FolderWriter::on_thermal(const ThermalImage& image, const Delivery& delivery) {
   const std::string path = folder_ + "/images/" + numbered(images_, ".png");
-  if (auto written = write_png16(path, image.width, image.height, image.counts); !written) error_ = written.error();
+  image_.width = static_cast<std::uint32_t>(image.width);
+  image_.height = static_cast<std::uint32_t>(image.height);
+  image_.pixels = image.counts;
+  if (auto written = dataset::write_png16(path, image_); !written) error_ = written.error();
   times_ << images_ << ' ' << std::setprecision(15) << static_cast<double>(delivery.stamp_ns) * 1e-9 << '\n';
   thermal_table_ << images_ << ',' << delivery.stamp_ns << ',' << nanoseconds(delivery.time) << ','
                  << delivery.arrival_ns << ',' << static_cast<int>(image.ffc) << ','

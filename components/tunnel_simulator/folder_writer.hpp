@@ -5,12 +5,11 @@
 #include <optional>
 #include <string>
 
+#include "components/dataset/png16.hpp"
+#include "components/dataset/point_file.hpp"
 #include "components/tunnel_simulator/simulation.hpp"
 
 namespace adit::tunnel_simulator {
-
-// 16-bit grey PNG.
-Result<void> write_png16(const std::string& path, int width, int height, const std::vector<std::uint16_t>& pixels);
 
 class FolderWriter final : public Sink {
  public:
@@ -35,7 +34,8 @@ class FolderWriter final : public Sink {
   const Simulation& simulation_;
   std::ofstream scan_index_, lidar_start_, lidar_middle_, lidar_end_, times_, thermal_table_, thermal_truth_, imu_,
       gnss_, base_;
-  std::vector<float> buffer_;
+  dataset::PointFile cloud_{dataset::standard_fields(6), 0, {}};
+  dataset::Image16 image_;
   std::uint64_t scans_ = 0, images_ = 0;
   std::optional<Error> error_;
 };
