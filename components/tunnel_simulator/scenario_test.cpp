@@ -77,6 +77,8 @@ Digest run(const std::filesystem::path& path, double duration, int threads, std:
   auto scenario = load_scenario(path.string());
   EXPECT_TRUE(scenario) << scenario.error().message;
   if (seed >= 0) scenario->seed = static_cast<std::uint64_t>(seed);
+  scenario->lidar.beams.columns = 128;  // an eighth of the sweep and a small camera: seconds, not minutes
+  scenario->thermal.camera = CameraModel::from_hfov(80, 64, 1.3);
   auto simulation = Simulation::create(std::move(*scenario), threads);
   EXPECT_TRUE(simulation) << simulation.error().message;
   Digest digest;
@@ -103,14 +105,12 @@ TEST(Scenarios, SixteenAndTheirVariantsParse) {
 
 TEST(Simulation, SameSeedSameBytesForAnyThreads) {
   const auto path = kScenarios / "s14_traffic.yaml";  // rough, warm, with moving vehicles
-  const Digest one = run(path, 0.25, 1);
-  const Digest two = run(path, 0.25, 2);
-  const Digest again = run(path, 0.25, 1);
-  const Digest other = run(path, 0.25, 1, 12345);
+  const Digest one = run(path, 0.2, 1);
+  const Digest two = run(path, 0.2, 2);
+  const Digest other = run(path, 0.2, 1, 12345);
   EXPECT_EQ(one.scans, 2);
-  EXPECT_EQ(one.images, 8);
-  EXPECT_EQ(one.inertial, 51);
-  EXPECT_EQ(one.value, again.value);
+  EXPECT_EQ(one.images, 6);
+  EXPECT_EQ(one.inertial, 41);
   EXPECT_EQ(one.value, two.value);
   EXPECT_NE(one.value, other.value);
 }
