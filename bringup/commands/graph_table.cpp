@@ -1,5 +1,6 @@
 #include "bringup/commands/graph_table.hpp"
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <thread>
@@ -32,6 +33,16 @@ std::string describe(const EndpointInfo& endpoint) {
          "\n    gid   " + to_string(endpoint.gid) + "\n";
 }
 
+// ROS participants name their nodes in a message of its own, which may arrive after their endpoints.
+bool nodes_missing(const Graph& graph) {
+  return std::any_of(graph.endpoints.begin(), graph.endpoints.end(), [&](const EndpointInfo& endpoint) {
+    if (!endpoint.node.empty() || !endpoint.topic.starts_with('/')) return false;
+    return std::any_of(graph.participants.begin(), graph.participants.end(), [&](const ParticipantInfo& participant) {
+      return !participant.enclave.empty() && participant.gid.same_participant(endpoint.gid);
+    });
+  });
+}
+
 }  // namespace
 
 Graph settled_graph(const Participant& participant, Duration limit) {
@@ -45,12 +56,18 @@ Graph settled_graph(const Participant& participant, Duration limit) {
     Graph next = participant.graph();
     // A domain with only ourselves in it is not at rest but not found yet.
     if (next.participants.size() <= 1 || next.participants.size() != graph.participants.size() ||
-        next.endpoints.size() != graph.endpoints.size() || next.nodes != graph.nodes) {
+        next.endpoints.size() != graph.endpoints.size() || next.nodes != graph.nodes || nodes_missing(next)) {
       changed = Steady::now();
     }
     graph = std::move(next);
   }
   return graph;
+}
+
+Result<Graph> observe(const ParticipantConfig& config, double limit_s) {
+  Result<std::unique_ptr<Participant>> participant = open(config);
+  if (!participant) return participant.error();
+  return settled_graph(**participant, Duration(static_cast<std::int64_t>(limit_s * 1e9)));
 }
 
 std::string topic_list(const Graph& graph, bool with_types) {

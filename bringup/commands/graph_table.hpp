@@ -8,8 +8,12 @@
 
 namespace adit {
 
-// The graph once discovery has come to rest: unchanged for 300 ms, at most `limit` after the call.
+// The graph once discovery has come to rest (unchanged for 300 ms, every ROS endpoint's node known), at most `limit`
+// after the call.
 Graph settled_graph(const Participant& participant, Duration limit);
+
+// Joins as `config` says, waits for the graph to settle and leaves.
+Result<Graph> observe(const ParticipantConfig& config, double limit_s);
 
 std::string topic_list(const Graph& graph, bool with_types);
 // Every endpoint of a topic with node, QoS and hash, then every pair whose QoS does not match and why; empty when there

@@ -12,12 +12,6 @@ struct Arguments {
   std::string node;
 };
 
-Result<Graph> observe(const Arguments& arguments) {
-  Result<std::unique_ptr<Participant>> participant = open(arguments.participant);
-  if (!participant) return participant.error();
-  return settled_graph(**participant, std::chrono::nanoseconds(static_cast<std::int64_t>(arguments.wait_s * 1e9)));
-}
-
 }  // namespace
 
 void add_node_command(CLI::App& app, ExitCode& code) {
@@ -33,7 +27,7 @@ void add_node_command(CLI::App& app, ExitCode& code) {
     sub->add_option("--wait", arguments->wait_s, "longest time to wait for discovery [s]")->capture_default_str();
   }
   list->callback([arguments, &code] {
-    const Result<Graph> graph = observe(*arguments);
+    const Result<Graph> graph = observe(arguments->participant, arguments->wait_s);
     if (!graph) {
       code = fail(graph.error());
       return;
@@ -41,7 +35,7 @@ void add_node_command(CLI::App& app, ExitCode& code) {
     std::fputs(node_list(*graph).c_str(), stdout);
   });
   info->callback([arguments, &code] {
-    const Result<Graph> graph = observe(*arguments);
+    const Result<Graph> graph = observe(arguments->participant, arguments->wait_s);
     if (!graph) {
       code = fail(graph.error());
       return;

@@ -25,21 +25,15 @@ Duration nanoseconds(double seconds) {
   return Duration(static_cast<std::int64_t>(seconds * 1e9));
 }
 
-Result<Graph> observe(const Arguments& arguments) {
-  Result<std::unique_ptr<Participant>> participant = open(arguments.participant);
-  if (!participant) return participant.error();
-  return settled_graph(**participant, nanoseconds(arguments.wait_s));
-}
-
 Result<void> list(const Arguments& arguments) {
-  const Result<Graph> graph = observe(arguments);
+  const Result<Graph> graph = observe(arguments.participant, arguments.wait_s);
   if (!graph) return graph.error();
   std::fputs(topic_list(*graph, arguments.types).c_str(), stdout);
   return {};
 }
 
 Result<void> info(const Arguments& arguments) {
-  const Result<Graph> graph = observe(arguments);
+  const Result<Graph> graph = observe(arguments.participant, arguments.wait_s);
   if (!graph) return graph.error();
   const std::string text = topic_details(*graph, arguments.topic);
   if (text.empty()) {

@@ -1,41 +1,11 @@
 // After warm-up a sweep costs no heap call. Counts every call of the C++ heap in this program.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 
 #include "components/lidar_odometry/lidar_odometry.hpp"
 #include "components/lidar_odometry/test_scene.hpp"
-
-namespace {
-std::atomic<std::uint64_t> heap_calls{0};
-}
-
-void* operator new(std::size_t size) {
-  ++heap_calls;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  ++heap_calls;
-  const auto align = static_cast<std::size_t>(alignment);
-  if (void* memory = std::aligned_alloc(align, (size + align - 1) / align * align)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
+#include "components/runtime/testing/allocation_counter.hpp"
 
 namespace adit::lidar_odometry {
 namespace {
@@ -62,7 +32,7 @@ TEST(Allocation, ASweepCostsNoHeapCallAfterWarmUp) {
       std::uint64_t before = 0;
       // The first two rounds warm up; in the third every sweep is counted.
       for (int round = 0; round < 3; ++round) {
-        if (round == 2) before = heap_calls;
+        if (round == 2) before = adit::testing::allocations();
         for (std::size_t k = 0; k < sweeps.size(); ++k) {
           Cloud cloud = sweeps[k].cloud();
           cloud.stamp_ns = stamp += 100'000'000;
@@ -70,7 +40,7 @@ TEST(Allocation, ASweepCostsNoHeapCallAfterWarmUp) {
           odometry.process(cloud, k % 4 == 0 ? &prior : nullptr);
         }
       }
-      EXPECT_EQ(heap_calls - before, 0u) << to_string(mode) << ", " << threads << " threads";
+      EXPECT_EQ(adit::testing::allocations() - before, 0u) << to_string(mode) << ", " << threads << " threads";
     }
   }
 }

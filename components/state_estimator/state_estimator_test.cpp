@@ -2,31 +2,14 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <limits>
-#include <new>
 
+#include "components/runtime/testing/allocation_counter.hpp"
 #include "components/state_estimator/measurement_models.hpp"
 #include "components/state_estimator/test_support.hpp"
-
-// Counts what the whole program allocates, for the no-allocation test.
-namespace {
-std::atomic<std::uint64_t> allocations{0};
-}
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
 
 namespace adit::state_estimator {
 namespace {
@@ -459,9 +442,9 @@ TEST(StateEstimator, SteadyStateDoesNotAllocate) {
     }
   };
   run(kSecond, 3 * kSecond);
-  const std::uint64_t before = allocations;
+  const std::uint64_t before = adit::testing::allocations();
   run(3 * kSecond, 30 * kSecond);
-  EXPECT_EQ(allocations - before, 0u);
+  EXPECT_EQ(adit::testing::allocations() - before, 0u);
 }
 
 TEST(Config, ChecksNameWhatIsWrong) {
