@@ -65,7 +65,7 @@ TEST_P(Supervision, KilledProcessesAreBackWithTrafficWithinTwoSeconds) {
   const std::vector<pid_t> listeners = children_of(run.pid(), "listening");
   ASSERT_EQ(listeners.size(), 1u);
 
-  constexpr int kills = 10;
+  constexpr int kills = 20;
   double worst = 0.0;
   for (int i = 0; i < kills; ++i) {
     const std::vector<pid_t> victims = children_of(run.pid(), "talking");
