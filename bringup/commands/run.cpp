@@ -44,7 +44,8 @@ class StatusFolder {
   std::string path_;
 };
 
-ChildSpec child_spec(const DeployedProcess& deployed, const Arguments& arguments, const StatusFolder& folder) {
+ChildSpec child_spec(const DeployedProcess& deployed, const ExpectedMatches& expected, const Arguments& arguments,
+                     const StatusFolder& folder) {
   ChildSpec spec;
   spec.name = deployed.process.name;
   spec.command = {std::filesystem::read_symlink("/proc/self/exe").string(),
@@ -54,6 +55,13 @@ ChildSpec child_spec(const DeployedProcess& deployed, const Arguments& arguments
                   "--status-file",
                   folder.file(spec.name)};
   for (const std::string& word : arguments.deployment.command_line()) spec.command.push_back(word);
+  for (const auto& [option, by_topic] :
+       {std::pair("--expect-writers", &expected.writers), std::pair("--expect-readers", &expected.readers)}) {
+    for (const auto& [topic, count] : *by_topic) {
+      spec.command.push_back(option);
+      spec.command.push_back(topic + "=" + std::to_string(count));
+    }
+  }
   spec.environment = deployed.environment;
   spec.restart = deployed.restart;
   spec.starts_when_linked = deployed.starts_when_linked;
@@ -117,8 +125,11 @@ Result<void> run(const Arguments& arguments) {
   }
   const StatusFolder folder;
   std::vector<ChildSpec> children;
-  for (const DeployedProcess& deployed : deployment->processes)
-    children.push_back(child_spec(deployed, arguments, folder));
+  for (const DeployedProcess& deployed : deployment->processes) {
+    const Result<ExpectedMatches> expected = expected_matches(*deployment, deployed.process.name);
+    if (!expected) return expected.error();
+    children.push_back(child_spec(deployed, *expected, arguments, folder));
+  }
 
   Supervisor supervisor(std::move(children));
   supervisor.on_restart(restore_states);

@@ -1,8 +1,6 @@
 #include "bringup/commands/topic_monitor.hpp"
 
 #include <csignal>
-#include <set>
-#include <thread>
 
 #include "bringup/commands/graph_table.hpp"
 

@@ -290,6 +290,13 @@ Result<Value::Map> load_parameters(const std::string& path, const std::string& t
 }
 
 Result<Deployment> load_deployment(const std::string& path, const DeploymentOverrides& overrides) {
+  Result<Deployment> deployment = read_deployment(path, overrides);
+  if (!deployment) return deployment;
+  if (Result<void> fine = check_components(*deployment); !fine) return fine.error();
+  return deployment;
+}
+
+Result<Deployment> read_deployment(const std::string& path, const DeploymentOverrides& overrides) {
   Result<std::string> text = read_text(path);
   if (!text) return text.error();
   text = substitute(*text, path, overrides.variables);
@@ -316,7 +323,6 @@ Result<Deployment> load_deployment(const std::string& path, const DeploymentOver
   }
   if (deployment.processes.empty()) root.error("processes", "there are no processes");
   if (Result<void> fine = document->finish(); !fine) return fine.error();
-  if (Result<void> fine = check_components(deployment); !fine) return fine.error();
   return deployment;
 }
 

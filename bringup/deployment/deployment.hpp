@@ -41,6 +41,10 @@ struct DeploymentOverrides {
 // of one name, unknown component types, parameters and inputs that their component does not have.
 Result<Deployment> load_deployment(const std::string& path, const DeploymentOverrides& overrides = {});
 
+// The same without making any component: for a process that its supervisor started from a file it has checked. Loading
+// every other process's components again would cost memory and time at each start.
+Result<Deployment> read_deployment(const std::string& path, const DeploymentOverrides& overrides = {});
+
 // The parameters that a ROS 2 parameter file gives to one component, as a deployment that names the file would.
 Result<Value::Map> load_parameters(const std::string& path, const std::string& type, const std::string& node);
 

@@ -19,7 +19,6 @@ class TrajectoryWriterComponent final : public Component {
                             [this](const Odometry& message, const MessageInfo&) { write(message); }};
   std::ofstream file_;
   std::optional<Time> last_;
-  std::uint64_t written_ = 0;
   std::uint64_t left_out_ = 0;
 
   Result<void> configure() override {
@@ -58,11 +57,7 @@ class TrajectoryWriterComponent final : public Component {
     pose.pose.translation() = position;
     file_ << tum_line(pose) << '\n' << std::flush;
     if (!file_) health(Health::error, path_.value() + ": cannot write: " + std::strerror(errno));
-    ++written_;
   }
-
- public:
-  ~TrajectoryWriterComponent() override = default;
 };
 
 ADIT_COMPONENT(TrajectoryWriterComponent, "trajectory_writer");
