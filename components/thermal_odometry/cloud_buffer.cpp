@@ -5,6 +5,7 @@
 namespace adit::thermal_odometry {
 namespace {
 constexpr std::int64_t max_extrapolation_ns = 200'000'000;
+constexpr std::int64_t max_newer_ns = 50'000'000;
 constexpr int bins = 16;  // poses across the duration of a cloud
 }  // namespace
 
@@ -70,7 +71,10 @@ std::span<const Eigen::Vector3f> CloudBuffer::at(std::int64_t stamp_ns, const Po
   const Cloud* best = nullptr;
   const auto max_age_ns = static_cast<std::int64_t>(1e9 * max_age_s_);
   for (const Cloud& cloud : clouds_) {
-    const bool fits = cloud.used && cloud.stamp_ns <= stamp_ns && stamp_ns - cloud.stamp_ns <= max_age_ns;
+    if (!cloud.used) continue;
+    const std::int64_t age =
+        stamp_ns - cloud.stamp_ns - static_cast<std::int64_t>(1e9 * static_cast<double>(cloud.last_offset_s));
+    const bool fits = age >= -max_newer_ns && age <= max_age_ns;
     if (fits && (best == nullptr || cloud.stamp_ns > best->stamp_ns)) best = &cloud;
   }
   if (best == nullptr) return {};

@@ -25,6 +25,9 @@ enum class ScaleState : std::uint8_t {
   metric,     // anchored by LiDAR depth
 };
 
+const char* to_string(Status status);
+const char* to_string(Verdict verdict);
+
 struct Counters {
   std::array<std::uint64_t, verdict_count> verdicts{};  // by Verdict
   std::uint64_t tracked = 0;
@@ -47,6 +50,9 @@ struct Estimate {
   // Motion since the previous measured frame; valid if both belong to one map (previous_stamp_ns != 0).
   std::int64_t previous_stamp_ns = 0;
   Pose T_previous_camera = Pose::Identity();
+  // Of the right increment of T_previous_camera, as of one alignment: photometric noise, without the scale's part,
+  // which is log_scale_sigma times the step and the same in every step.
+  Matrix6d step_covariance = Matrix6d::Identity();
 
   // Pose in the reference keyframe with the covariance of its right increment T exp(xi) (camera axes; [translation,
   // rotation]; photometric noise, depth and scale; no prior in it) and the bare photometric information of the same.
@@ -67,6 +73,7 @@ struct Estimate {
   float inlier_share = 0.0F;
   float visible_share = 0.0F;
   float correlation = 0.0F;  // between keyframe and frame over the points
+  float flow = 0.0F;         // px since the keyframe, median
   float gain = 0.0F;         // ln, relative to the keyframe
   float offset = 0.0F;       // noise units
   float noise_counts = 0.0F;

@@ -22,6 +22,7 @@ struct Frame {
   int stride = 0;             // elements from row to row; 0: width
   std::int64_t stamp_ns = 0;  // middle of the exposure, including the detector's thermal lag where it is known
   FfcState ffc = FfcState::unknown;
+  int saturation = 65535;  // counts at which a pixel says nothing
 };
 
 enum class Distortion : std::uint8_t { none, plumb_bob, rational };

@@ -55,7 +55,7 @@ Verdict FrameGate::check(const Frame& frame, float noise) {
       low = std::min<std::uint32_t>(low, value);
       high = std::max<std::uint32_t>(high, value);
       low_bits |= value & 0xFFU;
-      if (value >= config_.saturation) ++saturated;
+      if (value >= frame.saturation) ++saturated;
     }
   }
   double difference = 0.0;

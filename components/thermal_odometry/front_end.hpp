@@ -28,7 +28,6 @@ inline constexpr int verdict_count = 8;
 class FrameGate {
  public:
   struct Config {
-    int saturation = 65535;        // counts
     float frozen_fraction = 0.1F;  // of the temporal noise
   };
   FrameGate(const CameraModel& model, const Config& config);

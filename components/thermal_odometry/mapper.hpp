@@ -29,7 +29,7 @@ class Mapper {
     bool optimise = true;          // off, anchored mode: frame to keyframe alone
     float lidar_looseness = 5.0F;  // of the depth prior's sigma: absorbs a boresight error the pixels disagree with
     std::size_t max_cloud_points = 1U << 17U;
-    double max_cloud_age_s = 0.15;
+    double max_cloud_age_s = 0.2;  // from the last point of the sweep
   };
   Mapper(const CameraModel& camera, int levels, const Config& config);
 

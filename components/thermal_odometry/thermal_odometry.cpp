@@ -77,7 +77,7 @@ class ThermalOdometry::Engine {
     for (const WindowPoint& point : window.points()) {
       if (n == out.size()) break;
       const Patch& patch = point.patch;
-      const Warp warp(window.keyframe(patch.host).state, mapper_.newest().state, pinhole_);
+      const Warp warp(window.keyframe(patch.host).state, {T_cw_, 0.0, 0.0}, pinhole_);
       const Eigen::Vector3f X = warp.ray(patch.u, patch.v, patch.inverse_depth);
       if (!(X.z() > 0.05F)) continue;
       const Eigen::Vector2f p = warp.pixel(X);
@@ -150,7 +150,7 @@ class ThermalOdometry::Engine {
     initialiser_->start(stamp_ns, current_, pixels);
   }
 
-  // Two views agree: scale them to the last map's median depth, or to a median depth of one.
+  // Two views agree: scale them to the last map's median depth, or to the usual depth.
   bool start_map(std::int64_t stamp_ns) {
     const std::span<const Patch> found = initialiser_->patches();
     if (static_cast<int>(found.size()) < config_.mapper.min_points) return false;
@@ -159,7 +159,8 @@ class ThermalOdometry::Engine {
     const auto middle = patches.begin() + static_cast<std::ptrdiff_t>(patches.size() / 2);
     std::nth_element(patches.begin(), middle, patches.end(),
                      [](const Patch& a, const Patch& b) { return a.inverse_depth < b.inverse_depth; });
-    const float target = carried_inverse_depth_ > 0.0F ? carried_inverse_depth_ : 1.0F;
+    const auto usual = static_cast<float>(1.0 / config_.usual_depth);
+    const float target = carried_inverse_depth_ > 0.0F ? carried_inverse_depth_ : usual;
     const float factor = target / middle->inverse_depth;
     for (Patch& patch : patches) {
       patch.inverse_depth *= factor;
@@ -332,6 +333,7 @@ class ThermalOdometry::Engine {
     out_.inlier_share = result.inlier_share;
     out_.visible_share = result.visible_share;
     out_.correlation = result.correlation;
+    out_.flow = result.median_flow;
   }
 
   void accept(std::int64_t stamp_ns, double dt, const TrackResult& result) {
@@ -364,7 +366,9 @@ class ThermalOdometry::Engine {
       out_.log_scale_sigma = std::sqrt(out_.log_scale_sigma * out_.log_scale_sigma + scale_walk * walked);
     }
     const Matrix6d regular = result.information + 1e-6 * Matrix6d::Identity();
+    // The information is about the left increment of T_cw; the right increment of its inverse is its negative.
     out_.covariance = config_.correlation * regular.ldlt().solve(Matrix6d::Identity());
+    out_.step_covariance = out_.covariance;
     const Eigen::Vector3d moved = out_.T_keyframe_camera.rotation().transpose() * out_.T_keyframe_camera.translation();
     out_.covariance.topLeftCorner<3, 3>() += out_.log_scale_sigma * out_.log_scale_sigma * moved * moved.transpose();
   }
@@ -415,6 +419,9 @@ Result<std::unique_ptr<ThermalOdometry>> ThermalOdometry::create(const CameraMod
   if (Result<void> checked = check(camera); !checked) return checked.error();
   if (config.mapper.selection.wanted < 50 || config.mapper.selection.wanted > 4000) {
     return Error{ErrorCode::invalid_argument, "selection.wanted must be in 50 ... 4000"};
+  }
+  if (!(config.usual_depth > 1e-3 && config.usual_depth < 1e3)) {
+    return Error{ErrorCode::invalid_argument, "usual_depth must be in 0.001 ... 1000"};
   }
   return std::unique_ptr<ThermalOdometry>(new ThermalOdometry(std::make_unique<Engine>(camera, config)));
 }

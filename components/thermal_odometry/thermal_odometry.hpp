@@ -43,12 +43,13 @@ struct Config {
   double gap_s = 0.1;                 // longer since the last frame: start coarser, new keyframe
   int restart_after = 5;              // frames that could not be aligned
   bool prior_as_information = false;  // besides starting there: add the prior to the normal equations (paper R63)
+  double usual_depth = 1.0;           // median depth a monocular map starts with: its unit of length
   double correlation = 10.0;          // of residuals: covariance = correlation * inverse photometric information
 };
 
-// For pictures: a point of the newest keyframes seen in the newest keyframe (paper R32).
+// For pictures: a point of the map seen from the last measured pose (paper R32).
 struct MapPoint {
-  float u;  // px, rectified image of the newest keyframe
+  float u;  // px, rectified image
   float v;
   float depth;  // m or map units
   bool anchored;
