@@ -99,16 +99,24 @@ Dataset list_files(const fs::path& folder, const char* ending, Dataset::Kind kin
 
 }  // namespace
 
+Result<Dataset> open_images(const std::string& folder, double rate_hz) {
+  const fs::path root(folder);
+  const fs::path images = fs::is_directory(root / "images") ? root / "images" : root;
+  if (fs::exists(root / "times.txt")) {
+    return read_index(root / "times.txt", images, Dataset::Kind::png16, rate_hz);
+  }
+  Dataset dataset = list_files(images, ".png", Dataset::Kind::png16, rate_hz);
+  if (dataset.entries.empty()) return Error{ErrorCode::not_found, folder + ": no images: expected images/*.png"};
+  return dataset;
+}
+
 Result<Dataset> open_dataset(const std::string& folder, double rate_hz) {
   const fs::path root(folder);
   if (!fs::is_directory(root)) return Error{ErrorCode::not_found, folder + ": no such folder"};
   for (const fs::path& scans : {root / "scans", root}) {
     if (fs::exists(scans / "index.txt")) return read_index(scans / "index.txt", scans, Dataset::Kind::bin, rate_hz);
   }
-  if (fs::exists(root / "times.txt")) {
-    const fs::path images = fs::is_directory(root / "images") ? root / "images" : root;
-    return read_index(root / "times.txt", images, Dataset::Kind::png16, rate_hz);
-  }
+  if (fs::exists(root / "times.txt")) return open_images(folder, rate_hz);
   struct Plain {
     const char* ending;
     Dataset::Kind kind;

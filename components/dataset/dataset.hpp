@@ -26,4 +26,7 @@ struct Dataset {
 // runs backwards, a folder without data.
 Result<Dataset> open_dataset(const std::string& folder, double rate_hz);
 
+// The images of a folder that may hold clouds as well: images/*.png or *.png, stamped by times.txt or the rate.
+Result<Dataset> open_images(const std::string& folder, double rate_hz);
+
 }  // namespace adit::dataset
