@@ -161,6 +161,7 @@ void add_odometry_command(CLI::App& app, ExitCode& code) {
   lidar->callback([arguments, &code] {
     if (Result<void> done = run_lidar(*arguments); !done) code = fail(done.error());
   });
+  add_thermal_odometry_command(*command, code);
 }
 
 }  // namespace adit
