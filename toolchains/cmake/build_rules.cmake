@@ -14,8 +14,9 @@ target_include_directories(adit_build INTERFACE ${PROJECT_SOURCE_DIR})
 if(ADIT_SANITIZE)
   target_compile_options(adit_build INTERFACE -fsanitize=${ADIT_SANITIZE} -fno-omit-frame-pointer
                                               -fno-sanitize-recover=all)
-  # Instrumented code misleads these two (GCC's manual, -fsanitize); the other presets keep them as errors.
-  target_compile_options(adit_build INTERFACE -Wno-maybe-uninitialized -Wno-mismatched-new-delete)
+  # Instrumented code misleads these two of GCC (its manual, -fsanitize); the other presets keep them as errors.
+  target_compile_options(adit_build INTERFACE
+                         $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized;-Wno-mismatched-new-delete>)
   target_link_options(adit_build INTERFACE -fsanitize=${ADIT_SANITIZE})
 endif()
 
