@@ -15,6 +15,9 @@ int main(int argc, char** argv) {
   adit::add_evaluate_command(app, code);
   adit::add_odometry_command(app, code);
 #endif
+#ifdef ADIT_HAS_SIMULATOR
+  adit::add_simulate_command(app, code);
+#endif
   CLI11_PARSE(app, argc, argv);
   return code;
 }
