@@ -107,4 +107,11 @@ Localizability localizability(const Directions& directions, const Eigen::Matrix3
   return result;
 }
 
+Vector6d DirectionalInformation::exported_gradient(const Directions& directions, const Vector6d& gradient) {
+  const Vector6d diagonal = directions.information.cwiseMin(directions.curvature).cwiseMax(0.0);
+  Vector6d along = directions.basis.transpose() * gradient;
+  for (int i = 0; i < 6; ++i) along[i] = diagonal[i] > 0.0 ? along[i] * diagonal[i] / directions.curvature[i] : 0.0;
+  return directions.to_coordinates.transpose() * along;
+}
+
 }  // namespace adit::lidar_odometry

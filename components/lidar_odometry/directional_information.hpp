@@ -48,6 +48,8 @@ class DirectionalInformation {
 
   // What may be handed to a filter: effective information, nothing along directions without.
   static Matrix6d exported(const Directions& directions);
+  // The gradient of the same match that goes with it: -exported^-1 times this is where the match alone would go.
+  static Vector6d exported_gradient(const Directions& directions, const Vector6d& gradient);
 
  private:
   double required(int direction) const;

@@ -90,7 +90,10 @@ struct Estimate {
   // Of the match of this sweep against the local map: the LiDAR alone, no prior in it (fuse it with the prior without
   // counting the prior twice). Unobserved directions have zero information. Zero unless registered(status).
   Matrix6d information = Matrix6d::Zero();
-  // Inverse of the information with unobserved directions limited to 1 km and pi rad. Always positive definite.
+  // What is left of the slope of its cost at the pose: the match alone would move by -information^-1 gradient; what
+  // holds it back is the prior. Right perturbation, as the information.
+  Vector6d gradient = Vector6d::Zero();
+  // Inverse of the information with unobserved directions limited to 10 m and pi rad. Always positive definite.
   Matrix6d covariance = Matrix6d::Identity();
   Localizability localizability;
   ScanCounters scan;

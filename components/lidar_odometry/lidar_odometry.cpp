@@ -41,6 +41,7 @@ struct LidarOdometry::Impl {
   Pose odom_map = Pose::Identity();
   Pose map_sensor = Pose::Identity();
   Vector6d twist = Vector6d::Zero();
+  bool twist_known = false;  // from two registered sweeps
   int lost_in_a_row = 0;
   std::int64_t refused_stamp = 0;  // of the last cloud refused for its stamp
   int refused_in_a_row = 0;
@@ -75,6 +76,7 @@ void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
   estimate.scan = {};
   estimate.scan.points = static_cast<std::uint32_t>(cloud.points.size());
   estimate.information.setZero();
+  estimate.gradient.setZero();
   estimate.localizability = {};
   if (!consistent(cloud)) {
     estimate.status = Status::bad_cloud;
@@ -106,6 +108,7 @@ void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
   if (coasting) {
     task.twist = twist;
     task.prediction = map_sensor * se3_exp(task.dt * twist);
+    if (twist_known) task.coasting = task.prediction;
   }
   if (started && prior != nullptr) {
     task.external = true;
@@ -142,8 +145,10 @@ void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
   }
   if (task.dt > 0.0 && registered(estimate.status)) {
     twist = se3_log(map_sensor.inverse() * estimate.pose) / task.dt;
+    twist_known = true;
   } else if (!coasting) {
     twist.setZero();
+    twist_known = false;
   }
   map_sensor = estimate.pose;
   estimate.stamp_ns = stamp_ns;
@@ -183,6 +188,7 @@ void LidarOdometry::reset() {
   impl_->started = false;
   impl_->odom_map = impl_->map_sensor = Pose::Identity();
   impl_->twist.setZero();
+  impl_->twist_known = false;
   impl_->lost_in_a_row = impl_->refused_in_a_row = 0;
 }
 

@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <deque>
+#include <numbers>
 
+#include "adit_msgs/msg/localizability.hpp"
 #include "components/geometry/trajectory.hpp"
 #include "components/lidar_odometry/config.hpp"
 #include "components/lidar_odometry/lidar_odometry.hpp"
+#include "components/lidar_odometry/motion_prior.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
 #include "idl/point_cloud_view.hpp"
@@ -13,14 +16,21 @@
 namespace adit {
 namespace {
 
+using lidar_odometry::Direction;
 using lidar_odometry::Mode;
 using nav_msgs::msg::Odometry;
+using LocalizabilityMessage = adit_msgs::msg::Localizability;
 using sensor_msgs::msg::PointCloud2;
+
+// What `prior` is. guess: recorded poses of the sensor at the instants of the clouds, which wait for them; the
+// registration starts there and does not lean on them. pose, velocity: a live odometry; its poses' differences, or its
+// velocities, are weighed against the match. No cloud waits for it.
+enum class PriorKind { guess, pose, velocity };
 
 class LidarOdometryComponent final : public Component {
   using CloudPointer = std::shared_ptr<const PointCloud2>;
 
-  Param<Mode> mode_{*this, "mode", Mode::kiss,
+  Param<Mode> mode_{*this, "mode", Mode::default_,
                     Choices<Mode>{{"kiss", Mode::kiss}, {"genz", Mode::genz}, {"default", Mode::default_}},
                     "algorithm"};
   Param<double> min_range_{*this, "min_range", 0.5, Unit::metre, Range{0.0, 100.0}, "nearer points are dropped"};
@@ -30,13 +40,23 @@ class LidarOdometryComponent final : public Component {
   Param<bool> deskew_{*this, "deskew", true, "compensate the motion within the sweep"};
   Param<std::int64_t> threads_{*this, "threads", 1, Range{1.0, 16.0}, "the result does not depend on it"};
   Param<std::string> odom_frame_{*this, "odom_frame", std::string("odom"), "frame of the published poses"};
-  Param<bool> use_prior_{*this, "use_prior", false,
-                         "wait for `prior` odometry of the sensor and start the registration from it"};
-  Param<double> prior_timeout_{
-      *this,        "prior_timeout",   1.0,
-      Unit::second, Range{0.01, 60.0}, "a cloud waits this long for its prior, then goes without"};
+  Param<bool> use_prior_{*this, "use_prior", false, "use the odometry that arrives at `prior`"};
+  Param<PriorKind> prior_kind_{
+      *this, "prior_kind", PriorKind::guess,
+      Choices<PriorKind>{{"guess", PriorKind::guess}, {"pose", PriorKind::pose}, {"velocity", PriorKind::velocity}},
+      "guess: poses at the stamps of the clouds, to start from; pose, velocity: live odometry, weighed by its "
+      "covariance"};
+  Param<double> prior_timeout_{*this,        "prior_timeout",   1.0,
+                               Unit::second, Range{0.01, 60.0}, "kind guess: a cloud waits this long for its prior"};
+  Param<std::vector<double>> lidar_pose_{*this, "lidar_pose", std::vector<double>{0, 0, 0, 0, 0, 0, 1},
+                                         "of the LiDAR in the frame that a live prior moves: x y z [m], x y z w"};
+  Param<double> prior_velocity_sigma_{
+      *this, "prior_velocity_sigma", 0.0, Unit::metre_per_second, Range{0.0, 100.0}, "0: the covariance of its twist"};
+  Param<double> prior_rate_sigma_{
+      *this, "prior_rate_sigma", 0.0, Unit::radian_per_second, Range{0.0, 10.0}, "0: the covariance of its twist"};
 
   Output<Odometry> odometry_{*this, "odometry", Qos::reliable(10)};
+  Output<LocalizabilityMessage> localizability_{*this, "localizability", Qos::reliable(10)};
   Input<PointCloud2> points_{*this, "points", Qos::sensor(), Queue{2, WhenFull::drop_oldest},
                              [this](CloudPointer cloud, const MessageInfo&) { on_cloud(std::move(cloud)); }};
   Input<Odometry> prior_{*this, "prior", Qos::reliable(100), Queue{100, WhenFull::drop_oldest},
@@ -46,7 +66,7 @@ class LidarOdometryComponent final : public Component {
   // A cloud that waits for the prior of its instant.
   struct Waiting {
     CloudPointer cloud;
-    std::chrono::steady_clock::time_point until;
+    Time until;
   };
   static constexpr std::size_t max_waiting = 8;
   static constexpr std::size_t max_priors = 1000;
@@ -57,21 +77,41 @@ class LidarOdometryComponent final : public Component {
   std::vector<std::uint16_t> rings_buffer_;
   std::deque<Waiting> waiting_;
   Trajectory priors_;
-  std::optional<Pose> prior_at_last_;  // prior's pose at the instant of the last estimate
+  std::optional<Pose> prior_at_last_;  // its pose at the instant of the last estimate
+  lidar_odometry::MotionPrior motion_;
+  std::optional<std::int64_t> last_ns_;  // instant of the last estimate
   std::uint64_t refused_ = 0;
   std::uint64_t without_prior_ = 0;
 
   Result<void> configure() override;
   Result<void> activate() override;
+  Result<void> deactivate() override;
   void on_time_jump(Duration) override;
   void on_cloud(CloudPointer cloud);
   void on_prior(const Odometry& message);
   void process_waiting();
+  std::optional<lidar_odometry::Prior> prior_for(std::int64_t instant_ns, const std::optional<Pose>& guess) const;
   Result<lidar_odometry::Cloud> view(const PointCloud2& message);
   void process(const PointCloud2& message);
   void publish(const lidar_odometry::Estimate& estimate, const std::string& frame_id);
+  void publish_localizability(const lidar_odometry::Estimate& estimate, const std::string& frame_id);
   void report(const lidar_odometry::Estimate& estimate);
 };
+
+Result<Pose> pose_of(const Param<std::vector<double>>& param) {
+  const std::vector<double>& v = param.value();
+  if (v.size() != 7) {
+    return Error{ErrorCode::invalid_argument, param.name() + ": 7 numbers are wanted: x y z qx qy qz qw"};
+  }
+  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
+  if (!Eigen::Map<const Eigen::VectorXd>(v.data(), 7).allFinite() || !(std::abs(q.norm() - 1.0) < 0.01)) {
+    return Error{ErrorCode::invalid_argument, param.name() + ": not finite, or the quaternion's norm is not 1"};
+  }
+  Pose pose = Pose::Identity();
+  pose.linear() = q.normalized().toRotationMatrix();
+  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
+  return pose;
+}
 
 Result<void> LidarOdometryComponent::configure() {
   lidar_odometry::Config config;
@@ -82,7 +122,13 @@ Result<void> LidarOdometryComponent::configure() {
   config.threads = static_cast<int>(threads_.value());
   if (voxel_size_ > 0.0) config.kiss.voxel_size = config.genz.voxel_size = voxel_size_;
   if (Result<void> valid = lidar_odometry::check(config); !valid) return valid;
+  const Result<Pose> sensor = pose_of(lidar_pose_);
+  if (!sensor) return sensor.error();
   engine_.emplace(config);
+  motion_ = lidar_odometry::MotionPrior({.sensor = *sensor,
+                                         .differences = prior_kind_ == PriorKind::pose,
+                                         .velocity_sigma = prior_velocity_sigma_,
+                                         .rate_sigma = prior_rate_sigma_});
   return {};
 }
 
@@ -92,37 +138,54 @@ Result<void> LidarOdometryComponent::activate() {
   return {};
 }
 
+// The last clouds go without the priors that did not come.
+Result<void> LidarOdometryComponent::deactivate() {
+  for (const Waiting& waiting : waiting_) process(*waiting.cloud);
+  waiting_.clear();
+  return {};
+}
+
 void LidarOdometryComponent::on_time_jump(Duration) {
   engine_->reset();
   waiting_.clear();
   priors_.clear();
   prior_at_last_.reset();
+  motion_.clear();
+  last_ns_.reset();
 }
 
 void LidarOdometryComponent::on_cloud(CloudPointer cloud) {
-  if (!use_prior_) return process(*cloud);
-  const auto timeout =
-      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(prior_timeout_.value()));
+  if (!use_prior_ || prior_kind_ != PriorKind::guess) return process(*cloud);
+  const auto timeout = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(prior_timeout_.value()));
   if (waiting_.size() == max_waiting) {
     process(*waiting_.front().cloud);
     waiting_.pop_front();
   }
-  waiting_.push_back({std::move(cloud), std::chrono::steady_clock::now() + timeout});
+  waiting_.push_back({std::move(cloud), clock().now() + timeout});
   process_waiting();
 }
 
 void LidarOdometryComponent::on_prior(const Odometry& message) {
   const auto& p = message.pose.pose.position;
   const auto& q = message.pose.pose.orientation;
+  const auto& v = message.twist.twist;
   const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
-  StampedPose pose;
-  pose.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
-  pose.pose.translation() = Eigen::Vector3d(p.x, p.y, p.z);
-  if (!pose.pose.translation().allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01)) return;
-  pose.pose.linear() = rotation.normalized().toRotationMatrix();
-  if (!priors_.empty() && pose.stamp_ns <= priors_.back().stamp_ns) return;
+  if (!use_prior_ || !(std::abs(rotation.norm() - 1.0) < 0.01)) return;
+  lidar_odometry::MotionSample sample;
+  sample.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
+  sample.pose.translation() = Eigen::Vector3d(p.x, p.y, p.z);
+  sample.pose.linear() = rotation.normalized().toRotationMatrix();
+  if (prior_kind_ != PriorKind::guess) {
+    sample.twist << v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z;
+    sample.twist_covariance =
+        Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message.twist.covariance.data());
+    motion_.add(sample);
+    return;
+  }
+  if (!sample.pose.translation().allFinite()) return;
+  if (!priors_.empty() && sample.stamp_ns <= priors_.back().stamp_ns) return;
   if (priors_.size() == max_priors) priors_.erase(priors_.begin(), priors_.begin() + max_priors / 2);
-  priors_.push_back(pose);
+  priors_.push_back({sample.stamp_ns, sample.pose});
   process_waiting();
 }
 
@@ -130,7 +193,7 @@ void LidarOdometryComponent::process_waiting() {
   while (!waiting_.empty()) {
     const std::int64_t stamp = to_time(waiting_.front().cloud->header.stamp).time_since_epoch().count();
     const bool known = !priors_.empty() && priors_.back().stamp_ns >= stamp;
-    if (!known && std::chrono::steady_clock::now() < waiting_.front().until) return;
+    if (!known && clock().now() < waiting_.front().until) return;
     const CloudPointer cloud = std::move(waiting_.front().cloud);
     waiting_.pop_front();
     process(*cloud);
@@ -159,21 +222,34 @@ Result<lidar_odometry::Cloud> LidarOdometryComponent::view(const PointCloud2& me
   return cloud;
 }
 
+std::optional<lidar_odometry::Prior> LidarOdometryComponent::prior_for(std::int64_t instant_ns,
+                                                                       const std::optional<Pose>& guess) const {
+  if (!use_prior_ || !last_ns_) return std::nullopt;
+  if (prior_kind_ != PriorKind::guess) return motion_.between(*last_ns_, instant_ns);
+  if (!guess || !prior_at_last_) return std::nullopt;
+  lidar_odometry::Prior prior;
+  prior.pose = prior_at_last_->inverse() * *guess;
+  return prior;
+}
+
 void LidarOdometryComponent::process(const PointCloud2& message) {
   const Result<lidar_odometry::Cloud> cloud = view(message);
   if (!cloud) {
     health(Health::warn, std::to_string(++refused_) + " clouds refused: " + cloud.error().message);
     return;
   }
-  const std::optional<Pose> now = interpolate(priors_, engine_->reference_stamp_ns(*cloud));
-  lidar_odometry::Prior prior;
-  if (now && prior_at_last_) prior.pose = prior_at_last_->inverse() * *now;
-  const bool has_prior = now && prior_at_last_;
-  if (use_prior_ && !has_prior) ++without_prior_;
-  const lidar_odometry::Estimate& estimate = engine_->process(*cloud, has_prior ? &prior : nullptr);
-  if (estimate.status != lidar_odometry::Status::bad_stamp) prior_at_last_ = now;
+  const std::int64_t instant = engine_->reference_stamp_ns(*cloud);
+  const std::optional<Pose> guess = interpolate(priors_, instant);
+  const std::optional<lidar_odometry::Prior> prior = prior_for(instant, guess);
+  if (use_prior_ && !prior) ++without_prior_;
+  const lidar_odometry::Estimate& estimate = engine_->process(*cloud, prior ? &*prior : nullptr);
+  if (estimate.status != lidar_odometry::Status::bad_stamp) {
+    prior_at_last_ = guess;
+    last_ns_ = instant;
+  }
   report(estimate);
   if (estimate.status == lidar_odometry::Status::initialising || registered(estimate.status)) {
+    if (registered(estimate.status)) publish_localizability(estimate, message.header.frame_id);
     publish(estimate, message.header.frame_id);
   }
 }
@@ -194,6 +270,39 @@ void LidarOdometryComponent::publish(const lidar_odometry::Estimate& estimate, c
   message->twist.twist.angular = {v[3], v[4], v[5]};
   message->twist.covariance.fill(0.0);
   odometry_.publish(std::move(message));
+}
+
+void fill(const std::array<Direction, 3>& directions, double unknown, std::array<double, 9>& axes,
+          std::array<double, 3>& information, std::array<double, 3>& sigma, std::array<std::uint8_t, 3>& classes) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Direction& d = directions[i];
+    for (std::size_t k = 0; k < 3; ++k) axes[3 * i + k] = d.axis[static_cast<int>(k)];
+    sigma[i] = std::min(d.sigma, unknown);
+    information[i] = std::isinf(d.sigma) ? 0.0 : 1.0 / std::max(d.sigma * d.sigma, 1e-18);
+    classes[i] = d.observable          ? LocalizabilityMessage::LOCALIZABLE
+                 : std::isinf(d.sigma) ? LocalizabilityMessage::NONE
+                                       : LocalizabilityMessage::PARTIAL;
+  }
+}
+
+void LidarOdometryComponent::publish_localizability(const lidar_odometry::Estimate& estimate,
+                                                    const std::string& frame_id) {
+  if (!localizability_.has_readers()) return;
+  Loan<LocalizabilityMessage> message = localizability_.loan();
+  LocalizabilityMessage& m = *message;
+  m.header.stamp = to_stamp(Time(Duration(estimate.stamp_ns)));
+  m.header.frame_id = frame_id;
+  const lidar_odometry::Localizability& l = estimate.localizability;
+  fill(l.translation, 10.0, m.translation_directions, m.translation_information, m.translation_sigma,
+       m.translation_class);
+  fill(l.rotation, std::numbers::pi, m.rotation_directions, m.rotation_information, m.rotation_sigma, m.rotation_class);
+  std::copy_n(estimate.information.data(), estimate.information.size(), m.information.begin());  // symmetric
+  std::copy_n(estimate.gradient.data(), estimate.gradient.size(), m.gradient.begin());
+  m.required_sigma = lidar_odometry::SurfelConfig{}.required_translation;
+  m.residual_sigma = estimate.scan.rms_residual;
+  m.correspondences = estimate.scan.matched;
+  m.degenerate = estimate.status == lidar_odometry::Status::degenerate;
+  localizability_.publish(std::move(message));
 }
 
 void LidarOdometryComponent::report(const lidar_odometry::Estimate& estimate) {

@@ -48,7 +48,7 @@ Localizability localizability(const Matrix6d& information, const LocalizabilityC
 
 Matrix6d bounded_covariance(const Matrix6d& information) {
   Vector6d floor;
-  floor << Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1.0 / (std::numbers::pi * std::numbers::pi));
+  floor << Eigen::Vector3d::Constant(1e-2), Eigen::Vector3d::Constant(1.0 / (std::numbers::pi * std::numbers::pi));
   Matrix6d bounded = information;
   bounded.diagonal() += floor;
   const Matrix6d covariance = bounded.ldlt().solve(Matrix6d::Identity());

@@ -17,7 +17,8 @@ Localizability localizability(const Matrix6d& information, const LocalizabilityC
 // Information about the block [first, first + 3) with the other three unknown.
 Eigen::Matrix3d schur_complement(const Matrix6d& information, int first);
 
-// Inverse of the information with the variance of each direction limited to 1 km^2 and pi^2 rad^2.
+// Inverse of the information with the sigma of each direction limited to 10 m and pi rad. Not more: the unobserved axis
+// is itself known to some 0.01 degrees only, and a kilometre along it would count as decimetres across it.
 Matrix6d bounded_covariance(const Matrix6d& information);
 
 }  // namespace adit::lidar_odometry

@@ -33,7 +33,8 @@ void SurfelOdometry::reset() {
   last_median_ = 0.0;
 }
 
-// Without a prior from outside: the velocity stays, within what the vehicle's acceleration can change in dt.
+// Without a prior from outside: the velocity stays, within what the vehicle's acceleration can change in dt. With one:
+// both, each with its weight, so that directions the outside does not know keep their velocity.
 SurfelPrior SurfelOdometry::prior_of(const SweepTask& task) const {
   const double dt2 = std::clamp(task.dt * task.dt, 1e-6, 1.0);
   const double translation = config_.surfel.max_acceleration * dt2;
@@ -50,6 +51,16 @@ SurfelPrior SurfelOdometry::prior_of(const SweepTask& task) const {
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = task.prediction.linear();
   prior.information = turn * task.information * turn.transpose();
+  if (task.coasting) {
+    Vector6d apart;
+    apart << task.coasting->translation() - task.prediction.translation(),
+        so3_log(task.coasting->linear() * task.prediction.linear().transpose());
+    prior.information.diagonal() += diagonal;
+    const Vector6d step = prior.information.ldlt().solve(diagonal.cwiseProduct(apart));
+    prior.pose.translation() += step.head<3>();
+    prior.pose.linear() = orthonormalized(so3_exp(step.tail<3>()) * prior.pose.linear());
+    return prior;
+  }
   // A prior that leaves a direction open must not leave the solution open: 1 m, 0.2 rad.
   prior.information.diagonal().head<3>().array() += 1.0;
   prior.information.diagonal().tail<3>().array() += 25.0;
@@ -125,7 +136,7 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     }
     // From outside without a width: the match alone, unless it then turns out weak.
     if (!only_guess || result.matched < needed || !translation_observable(result.directions)) {
-      result = registration_.align(surfels_, map_, task.prediction, prior, twist, residual_gate, needed, pool_);
+      result = registration_.align(surfels_, map_, prior.pose, prior, twist, residual_gate, needed, pool_);
     }
     if (sweeps_ == 1 && !task.external) result = search_start(task, prior, twist, needed, result);
     estimate.scan.matched = static_cast<std::uint32_t>(result.matched);
@@ -143,6 +154,8 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     Matrix6d turn = Matrix6d::Zero();
     turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = result.pose.linear();
     estimate.information = turn.transpose() * information * turn;
+    estimate.gradient =
+        turn.transpose() * DirectionalInformation::exported_gradient(result.directions, result.gradient);
     estimate.localizability = localizability(result.directions, result.pose.linear());
     estimate.status = estimate.localizability.unobservable() > 0 ? Status::degenerate : Status::ok;
   }

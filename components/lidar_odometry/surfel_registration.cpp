@@ -167,6 +167,8 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
       Sums sums = linearise(pose, kernel, pool);
       result.rms_residual = std::sqrt(sums.squared / std::max(sums.weight, 1e-12));
       if (inner == 0) result.directions = information_.analyse(sums.hessian, constraints_);
+      const Matrix6d match_hessian = sums.hessian;
+      const Vector6d match_gradient = sums.gradient;
       if (prior.decides_weak_directions) information_.attenuate(result.directions, sums.hessian, sums.gradient);
       Vector6d error;
       error << pose.translation() - prior.pose.translation(), so3_log(pose.linear() * prior.pose.linear().transpose());
@@ -178,6 +180,7 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
         result.matched = 0;
         return result;
       }
+      result.gradient = match_gradient + match_hessian * step;
       pose.translation() += step.head<3>();
       pose.linear() = orthonormalized(so3_exp(step.tail<3>()) * pose.linear());
       const double length = step.head<3>().norm() + mean_range * step.tail<3>().norm();

@@ -34,7 +34,8 @@ struct SweepTwist {
 
 struct SurfelRegistrationResult {
   Pose pose = Pose::Identity();
-  Directions directions;  // in map axes
+  Directions directions;                 // in map axes
+  Vector6d gradient = Vector6d::Zero();  // of the match alone, at the result, map axes
   std::size_t matched = 0;
   int associations = 0, solves = 0;
   double median_residual = 0.0;  // m, absolute

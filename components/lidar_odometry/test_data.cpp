@@ -52,22 +52,31 @@ RecordedSweep read_sweep(const std::string& path, std::size_t count) {
 
 }  // namespace
 
-std::vector<RecordedSweep> read_sweeps(const std::string& folder, std::int64_t stamp_unit_ns) {
-  std::vector<RecordedSweep> sweeps;
-  std::ifstream index(folder + "/scans/index.txt");
-  for (std::string line; std::getline(index, line);) {
+SweepReader::SweepReader(const std::string& folder, std::int64_t stamp_unit_ns)
+    : folder_(folder), stamp_unit_ns_(stamp_unit_ns), index_(folder + "/scans/index.txt") {}
+
+std::optional<RecordedSweep> SweepReader::next() {
+  for (std::string line; std::getline(index_, line);) {
     if (line.empty() || line[0] == '#') continue;
     std::istringstream fields(line);
     std::string name;
     std::int64_t stamp = 0;
-    std::size_t count = 0;
+    std::size_t points = 0;
     fields >> name;
-    if (stamp_unit_ns > 0) fields >> stamp;
-    fields >> count;
-    RecordedSweep sweep = read_sweep(folder + "/scans/" + name, count);
-    sweep.stamp_ns = stamp_unit_ns > 0 ? stamp * stamp_unit_ns : static_cast<std::int64_t>(sweeps.size()) * 100'000'000;
-    sweeps.push_back(std::move(sweep));
+    if (stamp_unit_ns_ > 0) fields >> stamp;
+    fields >> points;
+    RecordedSweep sweep = read_sweep(folder_ + "/scans/" + name, points);
+    sweep.stamp_ns = stamp_unit_ns_ > 0 ? stamp * stamp_unit_ns_ : count_ * 100'000'000;
+    ++count_;
+    return sweep;
   }
+  return std::nullopt;
+}
+
+std::vector<RecordedSweep> read_sweeps(const std::string& folder, std::int64_t stamp_unit_ns) {
+  std::vector<RecordedSweep> sweeps;
+  SweepReader reader(folder, stamp_unit_ns);
+  while (std::optional<RecordedSweep> sweep = reader.next()) sweeps.push_back(*std::move(sweep));
   return sweeps;
 }
 

@@ -1,6 +1,7 @@
 // For tests and studies only: recorded sweeps from the shared data folder, and the figures of a trajectory.
 #pragma once
 
+#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,6 +29,19 @@ std::optional<std::string> shared_data(const std::string& name);
 // x, y, z, intensity[, t_rel[, ring]]. stamp_unit_ns: of the stamp column (0: the index has none, sweeps are 0.1 s
 // apart).
 std::vector<RecordedSweep> read_sweeps(const std::string& folder, std::int64_t stamp_unit_ns = 1);
+
+// The same one by one, for recordings that do not fit into memory.
+class SweepReader {
+ public:
+  explicit SweepReader(const std::string& folder, std::int64_t stamp_unit_ns = 1);
+  std::optional<RecordedSweep> next();
+
+ private:
+  std::string folder_;
+  std::int64_t stamp_unit_ns_;
+  std::ifstream index_;
+  std::int64_t count_ = 0;
+};
 
 // Vertices of a binary little-endian PLY file of float x, y, z, scalar.
 std::vector<Point3f> read_ply(const std::string& path);

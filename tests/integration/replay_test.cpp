@@ -49,7 +49,7 @@ TEST_P(Replay, RealSequenceBeatsTheStoredOdometryAndLosesNothing) {
   EXPECT_LT(so3_log(error.linear()).norm() * 180.0 / M_PI, 1.5);  // stored odometry: 5.9 degrees
 
   // Offline, without DDS, on one thread: the same poses to the last bit.
-  const std::string config = folder.write("config.yaml", "/**:\n  ros__parameters: {mode: kiss, max_range: 80.0}\n");
+  const std::string config = folder.write("config.yaml", "/**:\n  ros__parameters: {mode: default, max_range: 80.0}\n");
   const Output offline =
       run_adit({"odometry", "lidar", "--input", data.string(), "--prior", (data / "maplab_lidar.tum").string(),
                 "--config", config, "--out", folder.file("offline.tum"), "--timing", folder.file("timing.csv")});
