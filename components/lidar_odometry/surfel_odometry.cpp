@@ -34,7 +34,8 @@ void SurfelOdometry::reset() {
 }
 
 // Without a prior from outside: the velocity stays, within what the vehicle's acceleration can change in dt. With one:
-// both, each with its weight, so that directions the outside does not know keep their velocity.
+// directions that it does not know keep their velocity, too, but loosely: beside a prior that does know, the assumption
+// of a constant velocity would only lag.
 SurfelPrior SurfelOdometry::prior_of(const SweepTask& task) const {
   const double dt2 = std::clamp(task.dt * task.dt, 1e-6, 1.0);
   const double translation = config_.surfel.max_acceleration * dt2;
@@ -55,6 +56,7 @@ SurfelPrior SurfelOdometry::prior_of(const SweepTask& task) const {
     Vector6d apart;
     apart << task.coasting->translation() - task.prediction.translation(),
         so3_log(task.coasting->linear() * task.prediction.linear().transpose());
+    diagonal *= 1e-2;
     prior.information.diagonal() += diagonal;
     const Vector6d step = prior.information.ldlt().solve(diagonal.cwiseProduct(apart));
     prior.pose.translation() += step.head<3>();
