@@ -13,6 +13,7 @@
 #include "components/runtime/registry.hpp"
 #include "components/runtime/status.hpp"
 #include "components/runtime/timer.hpp"
+#include "components/runtime/trigger.hpp"
 #include "idl/result.hpp"
 #include "middleware/qos.hpp"
 

@@ -75,10 +75,12 @@ class ComponentCore final : public Strand {
   void add(OutputBase& output) { outputs_.push_back(&output); }
   void add(ParamBase& param) { params_.push_back(&param); }
   void add(Timer& timer) { timers_.push_back(&timer); }
+  void add(Trigger& trigger) { triggers_.push_back(&trigger); }
   void remove(InputBase& input) { std::erase(inputs_, &input); }
   void remove(OutputBase& output) { std::erase(outputs_, &output); }
   void remove(ParamBase& param) { std::erase(params_, &param); }
   void remove(Timer& timer) { std::erase(timers_, &timer); }
+  void remove(Trigger& trigger) { std::erase(triggers_, &trigger); }
 
   const Environment& environment() const { return environment_; }
   const Clock& clock() const { return *environment_.clock; }
@@ -94,6 +96,7 @@ class ComponentCore final : public Strand {
  private:
   bool run_one() override;
   bool fire_due_timer();
+  bool run_raised_trigger();
   void handle_next_message();
   bool more_to_do();
   void set_alarm();
@@ -117,6 +120,7 @@ class ComponentCore final : public Strand {
   std::vector<OutputBase*> outputs_;
   std::vector<ParamBase*> params_;
   std::vector<Timer*> timers_;
+  std::vector<Trigger*> triggers_;
 
   std::mutex running_;  // held while the component's code runs
   std::mutex queue_mutex_;

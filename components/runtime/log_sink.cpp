@@ -57,6 +57,7 @@ void LogSink::write(LogLevel level, std::string_view name, std::string_view text
   const Time now = system_now();
   const std::lock_guard lock(mutex_);
   if (ring_.empty()) return;
+  if (on_record_) on_record_();
   if (count_ == ring_.size()) {
     ++dropped_;
     return;
@@ -68,8 +69,9 @@ void LogSink::write(LogLevel level, std::string_view name, std::string_view text
   copy_cut(text, record.text);
 }
 
-void LogSink::keep_records(std::size_t capacity) {
+void LogSink::keep_records(std::size_t capacity, std::function<void()> on_record) {
   const std::lock_guard lock(mutex_);
+  on_record_ = std::move(on_record);
   ring_.assign(capacity, {});
   first_ = count_ = 0;
 }

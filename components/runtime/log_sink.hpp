@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string_view>
@@ -28,8 +29,10 @@ class LogSink {
   ~LogSink();
 
   void write(LogLevel level, std::string_view name, std::string_view text);
-  // Keeps up to `capacity` records for take() from now on; more are dropped and counted.
-  void keep_records(std::size_t capacity);
+  // Keeps up to `capacity` records for take() from now on; more are dropped and counted. `on_record` is called for each
+  // one, on the thread that logs: signal somebody and return, and do not log. When this returns, the previous one is
+  // not running and will not be called again.
+  void keep_records(std::size_t capacity, std::function<void()> on_record = nullptr);
   bool take(LogRecord& out);
   std::uint64_t dropped() const;
 
@@ -37,6 +40,7 @@ class LogSink {
   struct Console;
   std::unique_ptr<Console> console_;
   mutable std::mutex mutex_;
+  std::function<void()> on_record_;
   std::vector<LogRecord> ring_;
   std::size_t first_ = 0;
   std::size_t count_ = 0;

@@ -12,6 +12,20 @@ std::uint8_t to_ros(LogLevel level) {
 
 }  // namespace
 
+RosoutPublisher::RosoutPublisher(std::shared_ptr<LogSink> sink) : sink_(std::move(sink)) {
+  sink_->keep_records(256, [this] { logged_.raise(); });
+}
+
+RosoutPublisher::~RosoutPublisher() {
+  sink_->keep_records(0);
+}
+
+// What was logged before.
+Result<void> RosoutPublisher::activate() {
+  logged_.raise();
+  return {};
+}
+
 Result<void> RosoutPublisher::deactivate() {
   publish();
   return {};

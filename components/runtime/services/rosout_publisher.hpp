@@ -8,19 +8,21 @@
 
 namespace adit {
 
-// Mirrors the logs of the process to /rosout, ten times a second, away from the threads that log.
+// Mirrors the logs of the process to /rosout, away from the threads that log.
 class RosoutPublisher final : public Component {
  public:
-  explicit RosoutPublisher(std::shared_ptr<LogSink> sink) : sink_(std::move(sink)) { sink_->keep_records(256); }
+  explicit RosoutPublisher(std::shared_ptr<LogSink> sink);
+  ~RosoutPublisher() override;
 
  private:
+  Result<void> activate() override;
   Result<void> deactivate() override;
   void publish();
 
   std::shared_ptr<LogSink> sink_;
   std::uint64_t reported_drops_ = 0;
   Output<rcl_interfaces::msg::Log> rosout_{*this, "/rosout", Qos::rosout()};
-  Timer timer_{*this, "publish", std::chrono::milliseconds(100), [this] { publish(); }};
+  Trigger logged_{*this, [this] { publish(); }};
 };
 
 }  // namespace adit
