@@ -239,7 +239,7 @@ Result<Configuration> configure(const ParticipantConfig& config, std::string_vie
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = {10, 0};
   builtin.discovery_config.leaseDuration_announcementperiod = {1, 0};
-  builtin.discovery_config.initial_announcements = {5, {0, 10'000'000}};
+  builtin.discovery_config.initial_announcements = {5, {0, 2'000'000}};
   const auto& ports = qos.wire_protocol().port;
   look_for_participants(*address, config.domain, ports, builtin.initialPeersList);
   text += "discovery: unicast to " + *address;

@@ -1,4 +1,4 @@
-// A UDP transport that stays silent until the participant can hear the answers.
+// A UDP transport that announces a participant when it can hear the answers, and only to those who listen.
 #pragma once
 
 #include <fastdds/rtps/transport/ChainingTransport.h>
@@ -12,6 +12,10 @@ namespace adit::fastdds {
 // at once (Fast DDS does, once) is not heard, and both wait for the next announcement of a period of seconds. This
 // transport drops what is sent until `audible` is set, which is done when creation has returned; the announcements that
 // follow find everybody.
+//
+// Participants are looked for at the ports of all participant ids. On loopback the kernel knows at which of them
+// anybody listens: the others, nearly all, are left out, which saves 0.6 ms of system time each announcement. Who comes
+// later announces itself to us.
 class LateAnnouncement final : public eprosima::fastdds::rtps::ChainingTransportDescriptor {
  public:
   using Audible = std::shared_ptr<std::atomic<bool>>;

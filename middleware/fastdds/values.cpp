@@ -105,6 +105,15 @@ std::size_t keep_all_limit(const TypeInfo& type) {
   return std::clamp(memory / std::max<std::size_t>(type.typical_size, 1), fewest, most);
 }
 
+// The default period of 3 s is how long a reader stalls after the last sample of a burst was lost. A heartbeat and its
+// answer cost two processes about 100 us, as often as this; a keep-all writer cannot go on without them once it is
+// full. None is sent along with data: a volatile Cyclone DDS reader takes the first heartbeat it sees as the end of
+// what is not for it, which in the middle of a fragmented sample would cost it that sample. Therefore also no multiple
+// of a usual sensor's period (10, 20, 33, 40, 50, 67, 100 ms).
+std::uint32_t heartbeat_period_ms(const Qos& qos) {
+  return qos.depth == 0 ? 20 : 75;
+}
+
 dds::DataWriterQos writer_qos(const EndpointConfig& config, bool synchronous) {
   dds::DataWriterQos qos;
   set_common(config, qos);
@@ -113,10 +122,7 @@ dds::DataWriterQos writer_qos(const EndpointConfig& config, bool synchronous) {
               keep_all ? keep_all_limit(*config.type) : config.qos.depth);
   qos.reliability().max_blocking_time = to_vendor(config.qos.max_blocking);
   qos.publish_mode().kind = synchronous ? dds::SYNCHRONOUS_PUBLISH_MODE : dds::ASYNCHRONOUS_PUBLISH_MODE;
-  // The default period of 3 s is how long a reader stalls after the last sample of a burst was lost. None is sent along
-  // with data: a volatile Cyclone DDS reader takes the first heartbeat it sees as the end of what is not for it, which
-  // in the middle of a fragmented sample would cost it that sample.
-  qos.reliable_writer_qos().times.heartbeatPeriod = milliseconds(20);
+  qos.reliable_writer_qos().times.heartbeatPeriod = milliseconds(heartbeat_period_ms(config.qos));
   qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
   return qos;
 }
@@ -131,8 +137,9 @@ dds::DataReaderQos reader_qos(const EndpointConfig& config) {
   set_history(qos.history(), qos.resource_limits(), keep_all, samples);
   auto& limits = qos.reader_resource_limits();
   limits.max_samples_per_read = 1;
-  limits.outstanding_reads_allocation = {4, samples, 4};
-  limits.sample_infos_allocation = {4, samples, 4};
+  const std::size_t usual = std::min<std::size_t>(waiting + 6, 32);  // at once, without growing on the data path
+  limits.outstanding_reads_allocation = {usual, samples, 4};
+  limits.sample_infos_allocation = {usual, samples, 4};
   qos.reliable_reader_qos().times.initialAcknackDelay = milliseconds(5);
   return qos;
 }

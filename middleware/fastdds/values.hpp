@@ -27,6 +27,9 @@ std::size_t outstanding_limit(const Qos& qos);
 // Samples kept for a KEEP_ALL endpoint before it blocks its writers: bounded by memory for large types.
 std::size_t keep_all_limit(const TypeInfo& type);
 
+// How long after a sample a reliable writer asks its readers what they miss.
+std::uint32_t heartbeat_period_ms(const Qos& qos);
+
 // `synchronous`: publish() sends in the caller's thread.
 dds::DataWriterQos writer_qos(const EndpointConfig& config, bool synchronous);
 dds::DataReaderQos reader_qos(const EndpointConfig& config);

@@ -154,7 +154,7 @@ std::string VendorParticipant::explain() const {
          to_string(gid_) + "\n" + configuration_.explanation +
          "data-sharing: off; same process: by reference; writers: " +
          (configuration_.loopback ? "synchronous" : "synchronous, those of large messages asynchronous") +
-         ", heartbeat 20 ms\n";
+         ", heartbeat 75 ms, keep-all writers 20 ms\n";
 }
 
 void VendorParticipant::on_participant_discovery(dds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& discovered) {

@@ -35,11 +35,11 @@ int main(int argc, char** argv) {
   auto udp = std::make_shared<transport::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {"127.0.0.1"};
   auto memory = std::make_shared<transport::SharedMemTransportDescriptor>();
-  memory->segment_size(32u << 20);
+  memory->segment_size(16u << 20);
   participant_qos.transport().use_builtin_transports = false;
   participant_qos.transport().user_transports = {memory, udp};
   auto& builtin = participant_qos.wire_protocol().builtin;
-  builtin.discovery_config.initial_announcements = {5, {0, 10'000'000}};  // as ours
+  builtin.discovery_config.initial_announcements = {5, {0, 2'000'000}};  // as ours
   eprosima::fastrtps::rtps::Locator_t host;                               // unicast, as ours
   host.kind = LOCATOR_KIND_UDPv4;
   eprosima::fastrtps::rtps::IPLocator::setIPv4(host, "127.0.0.1");
