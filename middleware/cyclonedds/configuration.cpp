@@ -135,7 +135,11 @@ Result<Configuration> make_configuration(const ParticipantConfig& config) {
       // Repair of a lost 4 MB sample in one round: the defaults stop after 512 kB and ask again 100 ms later.
       << "<BurstSize><MaxRexmit>16MB</MaxRexmit></BurstSize>"
       << "<MaxQueuedRexmitBytes>16MB</MaxQueuedRexmitBytes><MaxQueuedRexmitMessages>2000</MaxQueuedRexmitMessages>"
-      << "<NackDelay>20ms</NackDelay>"
+      << "<NackDelay>" << (interface->loopback ? 10 : 20)
+      << "ms</NackDelay>"
+      // A reader that misses something asks again after this, not only when the writer's next heartbeat comes (3 s).
+      << "<AutoReschedNackDelay>" << (interface->loopback ? 20 : 200)
+      << "ms</AutoReschedNackDelay>"
       // How long a new reader waits before it asks a writer what there is: 10 ms by default, twice in each discovery.
       << "<PreEmptiveAckDelay>1ms</PreEmptiveAckDelay></Internal></Domain>";
   result.xml = xml.str();

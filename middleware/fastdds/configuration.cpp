@@ -232,8 +232,9 @@ Result<Configuration> configure(const ParticipantConfig& config, std::string_vie
   } else {
     text += "shared memory: switched off\n";
   }
+  if (!config.security) result.first_heartbeat = std::make_shared<FirstHeartbeat>();
   result.audible = std::make_shared<std::atomic<bool>>(false);
-  transport.user_transports.push_back(std::make_shared<LateAnnouncement>(udp, result.audible));
+  transport.user_transports.push_back(std::make_shared<LateAnnouncement>(udp, result.audible, result.first_heartbeat));
 
   // Discovery: unicast to the host itself and the static peers; the ports of all participant ids are tried.
   auto& builtin = qos.wire_protocol().builtin;

@@ -10,7 +10,8 @@ namespace adit::fastdds {
 
 struct Configuration {
   eprosima::fastdds::dds::DomainParticipantQos qos;
-  LateAnnouncement::Audible audible;  // to set when the participant is created
+  LateAnnouncement::Audible audible;                // to set when the participant is created
+  std::shared_ptr<FirstHeartbeat> first_heartbeat;  // null with security: what we would say must be signed
   bool loopback = true;
   std::string explanation;  // one "name: value" line each, warnings included
 };

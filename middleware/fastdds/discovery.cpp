@@ -28,8 +28,12 @@ Event mismatch(const EndpointInfo& ours, const EndpointInfo& other, std::vector<
 
 }  // namespace
 
+bool is_fast_dds(const Gid& gid) {
+  return gid.bytes[0] == 0x01 && gid.bytes[1] == 0x0f;
+}
+
 std::string vendor_name(const Gid& gid) {
-  if (gid.bytes[0] == 0x01 && gid.bytes[1] == 0x0f) return "Fast DDS";
+  if (is_fast_dds(gid)) return "Fast DDS";
   if (gid.bytes[0] == 0x01 && gid.bytes[1] == 0x10) return "Cyclone DDS";
   char text[24];
   std::snprintf(text, sizeof text, "vendor %02x.%02x", gid.bytes[0], gid.bytes[1]);

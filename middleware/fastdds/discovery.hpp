@@ -12,6 +12,8 @@ namespace adit::fastdds {
 
 // "Fast DDS", "Cyclone DDS", "vendor 01.42": by the first two bytes of a GUID.
 std::string vendor_name(const Gid& gid);
+// By the first two bytes of a GUID.
+bool is_fast_dds(const Gid& gid);
 // "/" of "enclave=/;"; empty when there is none. Humble's Fast DDS counts a terminating NUL in.
 std::string value_of(std::string_view key, std::string_view user_data);
 

@@ -25,14 +25,19 @@ bool may_be_heard(const rtps::Locator_t& locator, const std::vector<std::uint16_
 
 class Transport final : public transport::ChainingTransport {
  public:
-  Transport(const LateAnnouncement& descriptor, LateAnnouncement::Audible audible)
-      : ChainingTransport(descriptor), descriptor_(descriptor), audible_(std::move(audible)) {}
+  Transport(const LateAnnouncement& descriptor, LateAnnouncement::Audible audible,
+            std::shared_ptr<FirstHeartbeat> first_heartbeat)
+      : ChainingTransport(descriptor),
+        descriptor_(descriptor),
+        audible_(std::move(audible)),
+        first_heartbeat_(std::move(first_heartbeat)) {}
 
   transport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
 
   bool send(rtps::SenderResource* sender, const rtps::octet* message, std::uint32_t size, rtps::LocatorsIterator* first,
             rtps::LocatorsIterator* last, const std::chrono::steady_clock::time_point& timeout) override {
     if (!audible_->load(std::memory_order_relaxed)) return true;
+    if (first_heartbeat_) first_heartbeat_->sending({message, size});
     if (const auto* begin = dynamic_cast<const rtps::Locators*>(first)) {
       if (const auto heard = who_can_hear(*begin, *last); !heard.empty()) {
         rtps::Locators heard_first(heard.begin()), heard_last(heard.end());
@@ -43,6 +48,7 @@ class Transport final : public transport::ChainingTransport {
   }
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* message, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
+    if (first_heartbeat_) first_heartbeat_->received({message, size});
     next->OnDataReceived(message, size, local, remote);
   }
 
@@ -63,12 +69,13 @@ class Transport final : public transport::ChainingTransport {
 
   LateAnnouncement descriptor_;
   const LateAnnouncement::Audible audible_;
+  const std::shared_ptr<FirstHeartbeat> first_heartbeat_;
 };
 
 }  // namespace
 
 transport::TransportInterface* LateAnnouncement::create_transport() const {
-  return new Transport(*this, audible_);
+  return new Transport(*this, audible_, first_heartbeat_);
 }
 
 }  // namespace adit::fastdds

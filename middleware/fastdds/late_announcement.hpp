@@ -6,6 +6,8 @@
 #include <atomic>
 #include <memory>
 
+#include "middleware/fastdds/first_heartbeat.hpp"
+
 namespace adit::fastdds {
 
 // The vendor announces a new participant from within its creation, before its receivers are connected: whoever answers
@@ -19,12 +21,16 @@ namespace adit::fastdds {
 class LateAnnouncement final : public eprosima::fastdds::rtps::ChainingTransportDescriptor {
  public:
   using Audible = std::shared_ptr<std::atomic<bool>>;
-  LateAnnouncement(std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> udp, Audible audible)
-      : ChainingTransportDescriptor(std::move(udp)), audible_(std::move(audible)) {}
+  LateAnnouncement(std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> udp, Audible audible,
+                   std::shared_ptr<FirstHeartbeat> first_heartbeat)
+      : ChainingTransportDescriptor(std::move(udp)),
+        audible_(std::move(audible)),
+        first_heartbeat_(std::move(first_heartbeat)) {}
   eprosima::fastdds::rtps::TransportInterface* create_transport() const override;
 
  private:
   Audible audible_;
+  std::shared_ptr<FirstHeartbeat> first_heartbeat_;  // sees what passes; null: nobody
 };
 
 }  // namespace adit::fastdds

@@ -4,6 +4,7 @@
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <iostream>
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -183,10 +184,35 @@ void VendorParticipant::on_publisher_discovery(dds::DomainParticipant*, rtps::Wr
 
 void VendorParticipant::on_subscriber_discovery(dds::DomainParticipant*, rtps::ReaderDiscoveryInfo&& discovered) {
   if (discovered.status == rtps::ReaderDiscoveryInfo::REMOVED_READER) {
+    const std::lock_guard lock(addresses_mutex_);
+    addresses_.erase(to_gid(discovered.info.guid()));
     discovery_.remove_endpoint(to_gid(discovered.info.guid()));
   } else {
+    remember_address(discovered.info);
     post(discovery_.add(endpoint_info(discovered.info, discovered.info.m_qos, false), false));
   }
+}
+
+void VendorParticipant::remember_address(const rtps::ReaderProxyData& reader) {
+  const Gid gid = to_gid(reader.guid());
+  if (is_fast_dds(gid) || reader.m_qos.m_reliability.kind != dds::RELIABLE_RELIABILITY_QOS) return;
+  for (const rtps::Locator_t& locator : reader.remote_locators().unicast) {
+    if (locator.kind != LOCATOR_KIND_UDPv4) continue;
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(locator.port));
+    std::memcpy(&address.sin_addr, locator.address + 12, sizeof address.sin_addr);
+    const std::lock_guard lock(addresses_mutex_);
+    addresses_[gid] = address;
+    return;
+  }
+}
+
+void VendorParticipant::expect_first_heartbeat(const Gid& writer, const Gid& reader, std::uint64_t last) {
+  if (!first_heartbeat() || is_fast_dds(reader)) return;
+  const std::lock_guard lock(addresses_mutex_);
+  const auto found = addresses_.find(reader);
+  if (found != addresses_.end()) first_heartbeat()->expect(writer, reader, last, found->second);
 }
 
 void VendorParticipant::post(std::vector<Event> events) {

@@ -36,6 +36,9 @@ class VendorParticipant final : private dds::DomainParticipantListener {
   dds::Publisher& publisher() { return *publisher_; }
   dds::Subscriber& subscriber() { return *subscriber_; }
   EventQueue& events() { return events_; }
+  // Our volatile reliable writer and a reader of another vendor; `last` is the newest sample that is not for it.
+  void expect_first_heartbeat(const Gid& writer, const Gid& reader, std::uint64_t last);
+  FirstHeartbeat* first_heartbeat() { return configuration_.first_heartbeat.get(); }
   Graph graph() const { return discovery_.graph(); }
   const ParticipantConfig& config() const { return config_; }
   bool loopback() const { return configuration_.loopback; }
@@ -54,6 +57,7 @@ class VendorParticipant final : private dds::DomainParticipantListener {
   void on_publisher_discovery(dds::DomainParticipant*, rtps::WriterDiscoveryInfo&& discovered) override;
   void on_subscriber_discovery(dds::DomainParticipant*, rtps::ReaderDiscoveryInfo&& discovered) override;
   void post(std::vector<Event> events);
+  void remember_address(const rtps::ReaderProxyData& reader);
 
   const ParticipantConfig config_;
   const Configuration configuration_;
@@ -63,6 +67,8 @@ class VendorParticipant final : private dds::DomainParticipantListener {
   Gid gid_;
   Discovery discovery_;
   EventQueue events_;
+  std::mutex addresses_mutex_;
+  std::map<Gid, sockaddr_in> addresses_;  // of other vendors' reliable readers
   std::mutex topics_mutex_;
   std::map<std::string, SharedTopic> topics_;
 };

@@ -70,6 +70,7 @@ Result<std::unique_ptr<Writer>> FastWriter::create(std::shared_ptr<VendorPartici
 
 FastWriter::~FastWriter() {
   participant_->remove_endpoint(gid_);
+  if (auto* const heartbeat = participant_->first_heartbeat()) heartbeat->forget(gid_);
   if (writer_) participant_->publisher().delete_datawriter(writer_);
   if (has_topic_) participant_->release_topic(config_.topic);
 }
@@ -132,6 +133,13 @@ void FastWriter::on_publication_matched(dds::DataWriter* writer, const dds::Publ
   const Gid local = to_gid(writer->guid()), remote = to_gid(status.last_subscription_handle);
   const auto change = status.current_count_change;
   if (!local.same_participant(remote)) remote_readers_.fetch_add(change, std::memory_order_relaxed);
+  if (change <= 0) {
+    if (auto* const heartbeat = participant_->first_heartbeat()) heartbeat->forget(local, remote);
+  } else if (config_.qos.reliability == Qos::Reliability::reliable &&
+             config_.qos.durability == Qos::Durability::volatile_) {
+    // Sequence numbers count what was sent. One too low only makes the reader ask for what the vendor says is gone.
+    participant_->expect_first_heartbeat(local, remote, sent_.load(std::memory_order_relaxed));
+  }
   matched_.store(status.current_count, std::memory_order_relaxed);
   post(change > 0 ? Event::Kind::matched : Event::Kind::unmatched, remote, 0,
        std::string("writer of '") + config_.topic + (change > 0 ? "' matched reader " : "' lost reader ") +
