@@ -10,6 +10,7 @@
 #include "bringup/commands/deployment_options.hpp"
 #include "bringup/commands/process_status.hpp"
 #include "bringup/deployment/deployment.hpp"
+#include "bringup/supervisor/service_manager.hpp"
 #include "bringup/supervisor/status_table.hpp"
 #include "bringup/supervisor/supervisor.hpp"
 #include "middleware/participant.hpp"
@@ -109,6 +110,25 @@ Result<void> write_run_summary(const std::string& path, const Deployment& deploy
   return {};
 }
 
+// A process that was given up leaves the watchdog hungry: the service manager then starts the whole deployment afresh.
+void report(ServiceManager& service, const std::vector<ChildStatus>& children) {
+  std::size_t running = 0;
+  int restarts = 0;
+  std::string failed;
+  for (const ChildStatus& child : children) {
+    running += child.state == ChildStatus::State::running;
+    restarts += child.restarts;
+    if (child.state == ChildStatus::State::failed) failed += " " + child.name + " (" + child.last_end + ")";
+  }
+  service.ready();
+  if (failed.empty()) {
+    service.alive(std::to_string(running) + " of " + std::to_string(children.size()) + " processes run, " +
+                  std::to_string(restarts) + " restarts");
+  } else {
+    service.failing("given up:" + failed);
+  }
+}
+
 Result<void> run(const Arguments& arguments) {
   const Result<Deployment> deployment = load_deployment(arguments.deployment.path, arguments.deployment.overrides());
   if (!deployment) return deployment.error();
@@ -135,11 +155,16 @@ Result<void> run(const Arguments& arguments) {
   supervisor.on_restart(restore_states);
   StatusTable table(::isatty(STDOUT_FILENO) != 0 && !arguments.quiet);
   supervisor.on_log([&](const std::string& line) { table.log(line); });
-  supervisor.observe(std::chrono::seconds(1), [&](const std::vector<ChildStatus>& status) { table.show(status); });
+  ServiceManager service;
+  supervisor.observe(std::chrono::seconds(1), [&](const std::vector<ChildStatus>& status) {
+    table.show(status);
+    report(service, status);
+  });
   const auto start = std::chrono::steady_clock::now();
   std::optional<Duration> limit;
   if (arguments.duration_s > 0.0) limit = Duration(static_cast<std::int64_t>(arguments.duration_s * 1e9));
   const bool well = supervisor.run(limit);
+  service.stopping();
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!arguments.summary.empty()) {
     if (Result<void> written = write_run_summary(arguments.summary, *deployment, folder, supervisor.status(), wall_s);
