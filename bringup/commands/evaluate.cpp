@@ -1,12 +1,12 @@
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
-
-#include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "bringup/commands/command.hpp"
-#include "bringup/evaluation/report.hpp"
-#include "bringup/evaluation/summary.hpp"
+#include "bringup/commands/evaluation_report.hpp"
+#ifdef ADIT_HAS_SIMULATOR
+#include "bringup/offline/scenario_description.hpp"
+#endif
 
 namespace adit {
 namespace {
@@ -16,78 +16,84 @@ namespace ev = evaluation;
 struct Arguments {
   std::string truth;
   std::vector<std::string> estimates;  // NAME=FILE
+  std::string folder;                  // instead of the two
+  std::string scenario, centre_line;
+  std::vector<std::string> pictures;
   std::string out;
   std::string run;  // what `adit run --summary` wrote
   std::string alignment = "first_pose";
   ev::Options options;
 };
 
-Result<std::vector<ev::Evaluation>> evaluate_all(const Arguments& arguments, const Trajectory& truth) {
-  std::vector<ev::Evaluation> evaluations;
+Result<ev::RunFolder> evaluate_files(const Arguments& arguments) {
+  ev::RunFolder run;
+  Result<Trajectory> truth = read_tum(arguments.truth);
+  if (!truth) return truth.error();
+  run.truth = *std::move(truth);
   for (const std::string& argument : arguments.estimates) {
     const std::size_t equals = argument.find('=');
     if (equals == 0 || equals == std::string::npos) {
       return Error{ErrorCode::invalid_argument, "--estimate '" + argument + "': give NAME=FILE.tum"};
     }
-    const std::string name = argument.substr(0, equals);
-    const Result<Trajectory> estimate = read_tum(argument.substr(equals + 1));
-    if (!estimate) return estimate.error();
     Result<ev::Evaluation> evaluation =
-        estimate->empty() ? ev::nothing_delivered(name, truth) : ev::evaluate(truth, *estimate, arguments.options);
-    if (!evaluation) return Error{evaluation.error().code, name + ": " + evaluation.error().message};
-    evaluation->name = name;
-    evaluations.push_back(*std::move(evaluation));
+        ev::evaluate_file(argument.substr(0, equals), argument.substr(equals + 1), run.truth, arguments.options);
+    if (!evaluation) return evaluation.error();
+    run.evaluations.push_back(*std::move(evaluation));
   }
-  return evaluations;
+  return run;
 }
 
-// Adds a live run's links, CPU and real-time factor to the summary of its trajectories.
-Result<void> add_run_figures(const std::string& summary_path, const std::string& run_path, double duration_s) {
-  std::ifstream summary_file(summary_path), run_file(run_path);
-  nlohmann::json summary = nlohmann::json::parse(summary_file, nullptr, false);
-  const nlohmann::json run = nlohmann::json::parse(run_file, nullptr, false);
-  if (!run.is_object() || !run.contains("wall_s")) {
-    return Error{ErrorCode::malformed, run_path + ": not a file that `adit run --summary` wrote"};
+Result<std::vector<Eigen::Vector2d>> read_line(const std::string& path) {
+  std::ifstream file(path);
+  std::vector<Eigen::Vector2d> points;
+  for (double x = 0.0, y = 0.0; file >> x >> y;) points.emplace_back(x, y);
+  if (!file.eof() || points.size() < 2) {
+    return Error{ErrorCode::malformed, path + ": expected at least two points, two numbers each"};
   }
-  for (const char* key : {"middleware", "links", "cpu_s", "processes", "wall_s"}) {
-    if (run.contains(key)) summary[key] = run[key];
-  }
-  const double wall_s = run["wall_s"];
-  summary["realtime_factor"] = wall_s > 0.0 ? duration_s / wall_s : 0.0;
-  std::ofstream out(summary_path);
-  out << summary.dump(2) << '\n';
-  out.flush();
-  if (!out) return Error{ErrorCode::io, summary_path + ": cannot write"};
-  return {};
+  return points;
 }
 
 Result<void> run(Arguments& arguments) {
   const Result<ev::Alignment> alignment = ev::parse_alignment(arguments.alignment);
   if (!alignment) return alignment.error();
   arguments.options.alignment = *alignment;
-  const Result<Trajectory> truth = read_tum(arguments.truth);
-  if (!truth) return truth.error();
-  const Result<std::vector<ev::Evaluation>> evaluations = evaluate_all(arguments, *truth);
-  if (!evaluations) return evaluations.error();
-
-  std::fputs(ev::print_table(*evaluations).c_str(), stdout);
-  std::fputs(ev::print_drift_table(*evaluations).c_str(), stdout);
-  if (arguments.out.empty()) return {};
-  std::error_code bad;
-  std::filesystem::create_directories(arguments.out, bad);
-  if (bad) return Error{ErrorCode::io, arguments.out + ": cannot create the folder: " + bad.message()};
-  if (Result<void> written = ev::write_summary(arguments.out + "/summary.json", *evaluations); !written) return written;
-  if (Result<void> written = ev::write_report(arguments.out + "/report.html", *truth, *evaluations); !written) {
-    return written;
-  }
-  if (!arguments.run.empty()) {
-    const double duration_s = evaluations->front().truth_duration_s;
-    if (Result<void> added = add_run_figures(arguments.out + "/summary.json", arguments.run, duration_s); !added) {
-      return added;
+  ev::ReportOptions report;
+  if (!arguments.scenario.empty()) {
+#ifdef ADIT_HAS_SIMULATOR
+    if (Result<void> described = offline::describe_scenario(arguments.scenario, arguments.options, report);
+        !described) {
+      return described;
     }
+#else
+    return Error{ErrorCode::unavailable, "--scenario: built without the simulator"};
+#endif
   }
-  std::printf("wrote %s/summary.json and report.html\n", arguments.out.c_str());
-  return {};
+  if (!arguments.centre_line.empty()) {
+    Result<std::vector<Eigen::Vector2d>> line = read_line(arguments.centre_line);
+    if (!line) return line.error();
+    arguments.options.centre_line = *std::move(line);
+  }
+  if (arguments.folder.empty() == arguments.estimates.empty()) {
+    return Error{ErrorCode::invalid_argument, "give --truth and --estimate, or --folder"};
+  }
+  if (arguments.folder.empty() && arguments.truth.empty()) {
+    return Error{ErrorCode::invalid_argument, "--estimate needs --truth"};
+  }
+  Result<ev::RunFolder> evaluated =
+      arguments.folder.empty() ? evaluate_files(arguments) : ev::evaluate_folder(arguments.folder, arguments.options);
+  if (!evaluated) return evaluated.error();
+  if (arguments.out.empty()) arguments.out = arguments.folder;
+  if (!arguments.run.empty()) {
+    if (Result<void> added = add_run_figures(arguments.run, evaluated->evaluations); !added) return added;
+  }
+  for (const std::string& picture : arguments.pictures) {
+    std::ifstream file(picture, std::ios::binary);
+    std::ostringstream bytes;
+    if (!file || !(bytes << file.rdbuf())) return Error{ErrorCode::io, picture + ": cannot read"};
+    report.pictures.push_back({std::filesystem::path(picture).stem().string(), bytes.str()});
+  }
+  report.fusion = evaluated->fusion;
+  return report_evaluations(*evaluated, report, arguments.run, arguments.out);
 }
 
 }  // namespace
@@ -96,9 +102,20 @@ void add_evaluate_command(CLI::App& app, ExitCode& code) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       app.add_subcommand("evaluate", "compare trajectories with the truth: table, summary.json, report.html");
-  command->add_option("--truth", arguments->truth, "TUM file")->required()->check(CLI::ExistingFile);
-  command->add_option("--estimate", arguments->estimates, "NAME=FILE.tum (repeatable)")->required();
-  command->add_option("--out", arguments->out, "folder for summary.json and report.html");
+  command->add_option("--truth", arguments->truth, "TUM file")->check(CLI::ExistingFile);
+  command->add_option("--estimate", arguments->estimates,
+                      "NAME=FILE.tum (repeatable); with a FILE.cov beside it also NEES");
+  command->add_option("--folder", arguments->folder, "instead: a run's folder, truth.tum and NAME.tum files")
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--out", arguments->out, "folder for summary.json and report.html (default: that of --folder)");
+  command->add_option("--scenario", arguments->scenario, "scenario of the run: its map, outages, route and sensors")
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--centre-line", arguments->centre_line,
+                   "line for axial and lateral errors: a text file, x y [m] a line")
+      ->check(CLI::ExistingFile);
+  command->add_option("--picture", arguments->pictures, "PNG file to show in the report (repeatable)")
+      ->check(CLI::ExistingFile);
   command->add_option("--run", arguments->run, "figures of the live run (adit run --summary) to add to summary.json")
       ->check(CLI::ExistingFile);
   command->add_option("--align", arguments->alignment, "none, first_pose, se3 or sim3")->capture_default_str();

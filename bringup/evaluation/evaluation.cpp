@@ -5,6 +5,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "bringup/evaluation/centre_line.hpp"
+
 namespace adit::evaluation {
 namespace {
 
@@ -84,6 +86,15 @@ Sample compare(std::int64_t stamp_ns, const Pose& truth, const Pose& estimate) {
   s.lateral_error_m = -std::sin(heading) * error.x() + std::cos(heading) * error.y();
   s.yaw_error_rad = wrap_angle(yaw(estimate.linear()) - heading);
   return s;
+}
+
+void split_along(const std::vector<Eigen::Vector2d>& centre_line, std::vector<Sample>& samples) {
+  const CentreLine line(centre_line);
+  for (Sample& s : samples) {
+    const CentreLine::Split split = line.split(s.truth, s.estimate.translation());
+    s.axial_error_m = split.axial_m;
+    s.lateral_error_m = split.lateral_m;
+  }
 }
 
 void position_statistics(Evaluation& result) {
@@ -193,6 +204,7 @@ Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate,
 
   Evaluation result = nothing_delivered("", truth);
   result.largest_gap_s = 0.0;
+  result.alignment_yaw_rad = yaw(start.rotation);
   result.frames = pairs.stamps.size();
   for (std::size_t i = 0; i < pairs.stamps.size(); ++i) {
     Sample s = compare(pairs.stamps[i], pairs.truth[i], alignment->apply(pairs.estimate[i]));
@@ -200,8 +212,12 @@ Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate,
       result.distance_m += (pairs.truth[i].translation() - pairs.truth[i - 1].translation()).norm();
       s.distance_m = result.distance_m;
     }
+    const Pose from_start = start.apply(pairs.estimate[i]);
+    s.start_aligned = from_start.translation();
+    s.start_yaw_error_rad = wrap_angle(yaw(from_start.linear()) - yaw(s.truth.linear()));
     result.samples.push_back(s);
   }
+  if (!options.centre_line.empty()) split_along(options.centre_line, result.samples);
   position_statistics(result);
   coverage(truth, estimate, options, result);
   if (pairs.stamps.size() >= 2) {
@@ -209,6 +225,12 @@ Result<Evaluation> evaluate(const Trajectory& truth, const Trajectory& estimate,
     result.yaw_end_deg = kDegrees * std::abs(end.yaw_error_rad);
     result.axial_end_m = end.axial_error_m;
     result.lateral_end_m = end.lateral_error_m;
+    if (!options.centre_line.empty()) {
+      const CentreLine line(options.centre_line);
+      const CentreLine::Split split = line.split(end.truth, end.estimate.translation());
+      result.axial_end_m = split.axial_m;
+      result.lateral_end_m = split.lateral_m;
+    }
     if (result.distance_m >= kMinDistance) result.drift_percent = 100.0 * end.position_error_m / result.distance_m;
     result.scale = similarity_scale(pairs.truth, pairs.estimate);
   }

@@ -21,6 +21,9 @@ struct Options {
   double max_stamp_difference_s = 0.01;  // else its poses are paired with the estimate's nearest within this
   // A pause of the estimate longer than this counts as not available. 0: three times its median period.
   double max_estimate_gap_s = 0.0;
+  // Axial and lateral errors along this line (the tunnel's axis, the route; x, y): along it, and across. Empty: along
+  // the truth's heading at each instant, which says little of errors that reach around the next bend.
+  std::vector<Eigen::Vector2d> centre_line;
   std::vector<double> lengths_m = {1, 5, 10, 20, 50, 100, 200, 300, 400, 500, 600, 700, 800};
 };
 
@@ -31,9 +34,17 @@ struct Sample {
   Pose truth = Pose::Identity();
   Pose estimate = Pose::Identity();
   double position_error_m = 0.0;
-  double axial_error_m = 0.0;    // horizontal, along the truth's heading, ahead positive
-  double lateral_error_m = 0.0;  // horizontal, left of the truth's heading positive
+  double axial_error_m = 0.0;    // horizontal, along the truth's heading (or the centre line), ahead positive
+  double lateral_error_m = 0.0;  // horizontal, left of the truth's heading (or direction of travel) positive
   double yaw_error_rad = 0.0;    // heading of the estimate minus heading of the truth, in (-pi, pi]
+  // The same with the first poses aligned, whatever the options say.
+  Eigen::Vector3d start_aligned = Eigen::Vector3d::Zero();
+  double start_yaw_error_rad = 0.0;
+};
+
+struct StampedValue {
+  std::int64_t stamp_ns = 0;
+  double value = 0.0;
 };
 
 // Over all sub-paths of a length: start at every common instant, end at the first one at least `length_m` further on.
@@ -60,8 +71,14 @@ struct Evaluation {
   std::optional<double> scale;            // factor of the Sim(3) fit: truth = scale * estimate (evo's convention)
   double availability = 0.0;              // share of the truth's duration that the estimate covers without long pauses
   double largest_gap_s = 0.0;             // longest time without a pose within the truth's duration
-  std::vector<DriftByLength> drift;       // lengths that fit into the distance
-  std::vector<Sample> samples;            // in time order
+  double alignment_yaw_rad = 0.0;         // heading of the alignment of the first poses
+  // Of the planar pose, where the estimate has a covariance (consistency.hpp).
+  std::optional<double> nees_mean;        // 3 when the covariance is right
+  std::optional<double> sigma3_coverage;  // share of the samples whose axial error is within 3 sigma
+  std::vector<StampedValue> nees;
+  std::optional<double> cpu_s;       // processor time of the component that made the estimate
+  std::vector<DriftByLength> drift;  // lengths that fit into the distance
+  std::vector<Sample> samples;       // in time order
 };
 
 // Precondition of both: stamps strictly increase (what read_tum returns). Errors: fewer than two truth poses,

@@ -1,5 +1,6 @@
 #include "bringup/evaluation/report.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -36,6 +37,40 @@ std::vector<double> unwrapped_headings(const Trajectory& truth) {
   return headings;
 }
 
+std::string preformatted(const std::string& text);
+
+std::string base64(const std::string& bytes) {
+  static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t n = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t word = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      word = word << 8 | (k < n ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    }
+    for (std::size_t k = 0; k < 4; ++k) out += k <= n ? digits[word >> (18 - 6 * k) & 63U] : '=';
+  }
+  return out;
+}
+
+std::string inputs_table(const ReportOptions& options) {
+  if (options.inputs.empty()) return {};
+  std::string out = "<h2>Inputs</h2>\n<table>\n";
+  for (const auto& [what, is] : options.inputs) {
+    out += "<tr><th>" + escape_html(what) + "</th><td>" + escape_html(is) + "</td></tr>\n";
+  }
+  return out + "</table>\n";
+}
+
+// Share of the time in each mode, and the sensors' counts.
+std::string fusion_table(const ReportOptions& options) {
+  std::string out;
+  for (const FusionLog& log : options.fusion) {
+    for (const std::string& line : summary_of(log)) out += log.name + ": " + line + "\n";
+  }
+  return out.empty() ? out : "<h2>What the filters did</h2>\n" + preformatted(out);
+}
+
 std::string preformatted(const std::string& text) {
   return "<pre>" + escape_html(text) + "</pre>\n";
 }
@@ -53,6 +88,59 @@ Plot top_view(const Trajectory& truth, std::span<const Evaluation> evaluations) 
   plot.lines.push_back({"truth", {}});
   for (const StampedPose& p : truth) plot.lines[0].points.push_back(p.pose.translation().head<2>());
   add_lines(plot, evaluations, [](const Sample& s) { return Eigen::Vector2d(s.estimate.translation().head<2>()); });
+  return plot;
+}
+
+Plot map_with_route(const Trajectory& truth, const std::vector<std::vector<Eigen::Vector2d>>& map) {
+  Plot plot;
+  plot.title = "Map and route";
+  plot.x_label = "x [m]";
+  plot.y_label = "y [m]";
+  plot.equal_axes = true;
+  plot.background = map;
+  plot.first_is_truth = true;
+  plot.height_px = 520;
+  plot.lines.push_back({"route driven", {}});
+  for (const StampedPose& p : truth) plot.lines[0].points.push_back(p.pose.translation().head<2>());
+  return plot;
+}
+
+Plot nees_over_time(const Trajectory& truth, std::span<const Evaluation> evaluations) {
+  Plot plot;
+  plot.title = "NEES of x, y, heading (3 when the covariance is right; 16.3 is the 99.9 % quantile)";
+  plot.x_label = "time [s]";
+  plot.y_label = "NEES";
+  for (const Evaluation& e : evaluations) {
+    if (e.nees.empty()) continue;
+    PlotLine& line = plot.lines.emplace_back();
+    line.label = e.name;
+    for (const StampedValue& v : e.nees) line.points.emplace_back(since_start(truth, v.stamp_ns), v.value);
+  }
+  return plot;
+}
+
+Plot nis_over_time(const Trajectory& truth, const FusionLog& log) {
+  Plot plot;
+  plot.title = "NIS per degree of freedom, mean over a second: " + log.name + " (1 when the noise is right)";
+  plot.x_label = "time [s]";
+  plot.y_label = "NIS / dof";
+  for (const auto& sensor : log.sensors) {
+    PlotLine& line = plot.lines.emplace_back();
+    line.label = sensor.name;
+    double sum = 0.0;
+    int count = 0;
+    std::int64_t begin = 0;
+    for (std::size_t i = 0; i < sensor.innovations.size(); ++i) {
+      const StampedValue& v = sensor.innovations[i];
+      if (count == 0) begin = v.stamp_ns;
+      sum += v.value;
+      ++count;
+      if (v.stamp_ns - begin < 1'000'000'000 && i + 1 < sensor.innovations.size()) continue;
+      line.points.emplace_back(since_start(truth, begin), sum / count);
+      sum = 0.0;
+      count = 0;
+    }
+  }
   return plot;
 }
 
@@ -128,26 +216,47 @@ std::string report_html(const Trajectory& truth, std::span<const Evaluation> eva
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + escape_html(options.title) +
       "</title>\n<style>body{font-family:sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#222}"
       "pre{overflow-x:auto;background:#f6f6f6;padding:.8em;font-size:12px}svg{display:block;margin:1.2em 0;"
-      "max-width:100%;height:auto}</style></head><body>\n<h1>" +
+      "max-width:100%;height:auto}img{max-width:100%}th{text-align:left;vertical-align:top;padding-right:1.5em;"
+      "font-weight:normal;color:#666;white-space:nowrap}</style></head><body>\n<h1>" +
       escape_html(options.title) + "</h1>\n";
   if (!options.description.empty()) out += "<p>" + escape_html(options.description) + "</p>\n";
+  out += inputs_table(options);
   out += "<h2>Figures</h2>\n" + preformatted(print_table(evaluations));
   out +=
       "<p>ATE after alignment; drift, heading, axial and lateral error at the end from the first common pose on; "
-      "scale is the factor that fits the estimate to the truth; a dash is a figure that does not exist.</p>\n";
+      "scale is the factor that fits the estimate to the truth; NEES is 3 and 3 sigma nearly 100 % when a covariance "
+      "is "
+      "right; CPU is that of the component alone, of the simulated time; a dash is a figure that does not exist.</p>\n";
+  const std::string parts = print_decomposition_table(evaluations);
+  if (!parts.empty()) {
+    out += "<h2>Where the position errors come from</h2>\n" + preformatted(parts) +
+           "<p>By heading: what goes away when each step is turned by the heading error of its instant. By scale: what "
+           "then goes away with one factor on all steps.</p>\n";
+  }
   const std::string drift = print_drift_table(evaluations);
   if (!drift.empty()) out += "<h2>Drift by length</h2>\n" + preformatted(drift);
-  out += "<h2>Plots</h2>\n" + render_svg(top_view(truth, evaluations));
-  out += render_svg(position_error_over_distance(evaluations));
-  out += render_svg(tunnel_error_over_distance(evaluations, true));
-  out += render_svg(tunnel_error_over_distance(evaluations, false));
-  Plot timed[] = {position_error_over_time(truth, evaluations), heading_over_time(truth, evaluations),
-                  heading_error_over_time(truth, evaluations)};
+  out += fusion_table(options);
+  out += "<h2>Plots</h2>\n";
+  if (!options.map.empty()) out += render_svg(map_with_route(truth, options.map));
+  Plot view = top_view(truth, evaluations);
+  view.background = options.map;
+  out += render_svg(view);
+  std::vector<Plot> timed = {heading_over_time(truth, evaluations), position_error_over_time(truth, evaluations),
+                             heading_error_over_time(truth, evaluations), nees_over_time(truth, evaluations)};
+  for (const FusionLog& log : options.fusion) timed.push_back(nis_over_time(truth, log));
   for (Plot& plot : timed) {
+    if (plot.lines.empty()) continue;
     for (const auto& [from, to] : options.outages_ns) {
       plot.shaded.push_back({since_start(truth, from), since_start(truth, to)});
     }
     out += render_svg(plot);
+  }
+  out += render_svg(position_error_over_distance(evaluations));
+  out += render_svg(tunnel_error_over_distance(evaluations, true));
+  out += render_svg(tunnel_error_over_distance(evaluations, false));
+  for (const ReportOptions::Picture& picture : options.pictures) {
+    out += "<h2>" + escape_html(picture.caption) + "</h2>\n<img alt=\"\" src=\"data:image/png;base64," +
+           base64(picture.png) + "\">\n";
   }
   return out + "</body></html>\n";
 }

@@ -10,11 +10,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bringup/evaluation/decomposition.hpp"
+#include "bringup/evaluation/text_table.hpp"
+
 namespace adit::evaluation {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Row = std::vector<std::string>;
+using Row = TextRow;
 
 Json number(const std::optional<double>& value) {
   return value ? Json(*value) : Json(nullptr);
@@ -27,25 +30,8 @@ std::string text(const std::optional<double>& value, const char* format) {
   return buffer;
 }
 
-// First column left, the others right aligned.
-std::string layout(const std::vector<Row>& rows) {
-  std::vector<std::size_t> width(rows.front().size(), 0);
-  for (const Row& row : rows) {
-    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
-  }
-  std::string out;
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    for (std::size_t c = 0; c < width.size(); ++c) {
-      const std::string pad(width[c] - rows[r][c].size(), ' ');
-      out += c == 0 ? rows[r][c] + pad : "  " + pad + rows[r][c];
-    }
-    while (out.back() == ' ') out.pop_back();
-    out += '\n';
-    if (r > 0) continue;
-    for (std::size_t c = 0; c < width.size(); ++c) out += (c == 0 ? "" : "  ") + std::string(width[c], '-');
-    out += '\n';
-  }
-  return out;
+std::optional<double> percent(const std::optional<double>& part, double whole) {
+  return part && whole > 0.0 ? std::optional<double>(100.0 * *part / whole) : std::nullopt;
 }
 
 }  // namespace
@@ -62,6 +48,18 @@ std::string summary_json(std::span<const Evaluation> evaluations) {
     row["scale"] = number(e.scale);
     row["availability"] = e.availability;
     row["frames"] = e.frames;
+    row["axial_end_m"] = number(e.axial_end_m);
+    row["lateral_end_m"] = number(e.lateral_end_m);
+    row["largest_gap_s"] = e.largest_gap_s;
+    row["nees"] = number(e.nees_mean);
+    row["sigma3_coverage"] = number(e.sigma3_coverage);
+    row["cpu_s"] = number(e.cpu_s);
+    const Decomposition parts = decompose(e.samples);
+    row["error_end_m"] = {{"total", parts.end.total_m},
+                          {"yaw", parts.end.yaw_m},
+                          {"scale", parts.end.scale_m},
+                          {"rest", parts.end.rest_m},
+                          {"yaw_share", parts.yaw_share}};
   }
   summary["distance_m"] = evaluations.empty() ? Json(nullptr) : Json(evaluations.front().truth_distance_m);
   summary["duration_s"] = evaluations.empty() ? Json(nullptr) : Json(evaluations.front().truth_duration_s);
@@ -86,14 +84,35 @@ Result<void> write_summary(const std::string& path, std::span<const Evaluation> 
 
 std::string print_table(std::span<const Evaluation> evaluations) {
   std::vector<Row> rows = {{"estimate", "ATE rmse [m]", "median", "max", "RPE 10 m [%]", "drift [%]", "yaw end [deg]",
-                            "axial end [m]", "lateral end [m]", "scale", "available [%]", "gap max [s]", "frames"}};
+                            "axial end [m]", "lateral end [m]", "scale", "available [%]", "gap max [s]", "NEES",
+                            "3 sigma [%]", "CPU [%]", "frames"}};
   for (const Evaluation& e : evaluations) {
     rows.push_back({e.name, text(e.ate_rmse_m, "%.3f"), text(e.ate_median_m, "%.3f"), text(e.ate_max_m, "%.3f"),
                     text(e.rpe_10m_percent, "%.3f"), text(e.drift_percent, "%.3f"), text(e.yaw_end_deg, "%.3f"),
                     text(e.axial_end_m, "%+.3f"), text(e.lateral_end_m, "%+.3f"), text(e.scale, "%.5f"),
-                    text(100.0 * e.availability, "%.1f"), text(e.largest_gap_s, "%.2f"), std::to_string(e.frames)});
+                    text(100.0 * e.availability, "%.1f"), text(e.largest_gap_s, "%.2f"), text(e.nees_mean, "%.2f"),
+                    text(percent(e.sigma3_coverage, 1.0), "%.1f"), text(percent(e.cpu_s, e.truth_duration_s), "%.1f"),
+                    std::to_string(e.frames)});
   }
-  return layout(rows);
+  return lay_out(rows);
+}
+
+std::string print_decomposition_table(std::span<const Evaluation> evaluations) {
+  std::vector<Row> rows = {{"estimate", "error at the end [m]", "by heading", "by scale", "rest", "rms [m]",
+                            "by heading", "by scale", "rest", "share of the heading [%]", "speed scale"}};
+  for (const Evaluation& e : evaluations) {
+    if (e.samples.size() < 2) continue;
+    const Decomposition d = decompose(e.samples);
+    Row& row = rows.emplace_back(Row{e.name});
+    for (const ErrorParts& parts : {d.end, d.rms}) {
+      for (const double value : {parts.total_m, parts.yaw_m, parts.scale_m, parts.rest_m}) {
+        row.push_back(text(value, "%.3f"));
+      }
+    }
+    row.push_back(text(100.0 * d.yaw_share, "%.0f"));
+    row.push_back(text(d.speed_scale, "%.5f"));
+  }
+  return rows.size() == 1 ? std::string() : lay_out(rows);
 }
 
 std::string print_drift_table(std::span<const Evaluation> evaluations) {
@@ -104,7 +123,7 @@ std::string print_drift_table(std::span<const Evaluation> evaluations) {
                       text(d.rotation_deg_per_m, "%.4f"), text(d.translation_rmse_m, "%.4f")});
     }
   }
-  return rows.size() == 1 ? std::string() : layout(rows);
+  return rows.size() == 1 ? std::string() : lay_out(rows);
 }
 
 }  // namespace adit::evaluation

@@ -110,6 +110,15 @@ std::string path(const PlotLine& line, const Frame& frame, const std::string& st
   return data.empty() ? std::string() : "<path d=\"" + data + "\" fill=\"none\" " + stroke + "/>\n";
 }
 
+// Points outside the plot interrupt the line.
+std::vector<Eigen::Vector2d> inside(std::vector<Eigen::Vector2d> points, const Frame& frame) {
+  for (Eigen::Vector2d& p : points) {
+    const bool shown = p.x() >= frame.x.low && p.x() <= frame.x.high && p.y() >= frame.y.low && p.y() <= frame.y.high;
+    if (!shown) p.setConstant(std::nan(""));
+  }
+  return points;
+}
+
 }  // namespace
 
 std::string escape_html(const std::string& text) {
@@ -164,6 +173,9 @@ std::string render_svg(const Plot& plot) {
                   to - from, frame.height);
   }
   out += axes(plot, frame);
+  for (const std::vector<Eigen::Vector2d>& points : plot.background) {
+    out += path({"", inside(points, frame)}, frame, "stroke=\"#999\" stroke-width=\"0.8\"");
+  }
   out += text_at(kLeft, 15, "font-weight=\"bold\"", plot.title);
   double legend_x = kLeft;
   for (std::size_t i = 0; i < plot.lines.size(); ++i) {
