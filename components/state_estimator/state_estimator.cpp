@@ -16,6 +16,7 @@ FilterState initial_state(const InitialState& initial, const Config& config, std
   s.x(kX) = initial.x;
   s.x(kY) = initial.y;
   s.x(kYaw) = wrap_angle(initial.yaw);
+  s.x(kSpeed) = initial.speed;
   const auto sigma = [&](int index, double value) { s.p(index, index) = value * value; };
   sigma(kX, initial.sigma_position);
   sigma(kY, initial.sigma_position);

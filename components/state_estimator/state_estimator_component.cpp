@@ -9,9 +9,11 @@
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
 #include "components/state_estimator/correction.hpp"
+#include "components/state_estimator/gnss_frame.hpp"
 #include "components/state_estimator/state_estimator.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/imu.hpp"
+#include "sensor_msgs/msg/nav_sat_fix.hpp"
 #include "tf2_msgs/msg/tf_message.hpp"
 
 namespace adit {
@@ -21,6 +23,7 @@ using adit_msgs::msg::FusionStatus;
 using adit_msgs::msg::SensorStatus;
 using nav_msgs::msg::Odometry;
 using sensor_msgs::msg::Imu;
+using sensor_msgs::msg::NavSatFix;
 using state_estimator::Estimate;
 using state_estimator::SensorReport;
 using state_estimator::StateEstimator;
@@ -63,6 +66,18 @@ class StateEstimatorComponent final : public Component {
       "the LiDAR odometry's pose covariance is that of its last registration (false: one that accumulates; not used)"};
   Param<bool> thermal_covariance_{*this, "thermal_covariance", true, "the same of the thermal odometry"};
   Param<bool> use_imu_{*this, "use_imu", false, "fuse `imu`"};
+  Param<bool> use_gnss_{*this, "use_gnss", false,
+                        "fuse `fix`: after the first metres in the open, which show how odom lies on the Earth"};
+  Param<Numbers> gnss_antenna_{*this, "gnss_antenna", Numbers{0, 0}, "of the antenna in base_frame: x y [m]"};
+  Param<Numbers> gnss_origin_{
+      *this, "gnss_origin", {}, "latitude, longitude [deg], altitude [m] of the local frame; empty: the first fix"};
+  Param<double> gnss_baseline_{*this,       "gnss_baseline",    40.0,
+                               Unit::metre, Range{5.0, 1000.0}, "driven with fixes before they are fused"};
+  Param<Numbers> initial_pose_{*this, "initial_pose", Numbers{0, 0, 0}, "in odom_frame: x y [m], heading [rad]"};
+  Param<double> initial_speed_{
+      *this, "initial_speed", 0.0, Unit::metre_per_second, Range{-60.0, 60.0}, "when the first measurement comes"};
+  Param<double> initial_speed_sigma_{
+      *this, "initial_speed_sigma", 1.0, Unit::metre_per_second, Range{1e-3, 60.0}, "its deviation"};
   Param<double> max_interval_{*this,        "max_interval",    0.5,
                               Unit::second, Range{0.01, 30.0}, "longer steps of an odometry are gaps"};
 
@@ -75,9 +90,11 @@ class StateEstimatorComponent final : public Component {
                            [this](const Odometry& message, const MessageInfo&) { on_odometry(1, message); }};
   Input<Imu> imu_{*this, "imu", Qos::sensor(), Queue{200, WhenFull::drop_oldest},
                   [this](const Imu& message, const MessageInfo&) { on_imu(message); }};
+  Input<NavSatFix> fix_{*this, "fix", Qos::sensor(), Queue{20, WhenFull::drop_oldest},
+                        [this](const NavSatFix& message, const MessageInfo&) { on_fix(message); }};
   Timer output_{*this, "output", std::chrono::milliseconds(10), [this] { publish(); }};
 
-  // What the estimator does not keep of an input: lidar, thermal, imu.
+  // What the estimator does not keep of an input: lidar, thermal, imu, gnss.
   struct Arrivals {
     std::int64_t last_ns = state_estimator::kNoStamp;
     std::uint64_t late = 0;
@@ -86,15 +103,19 @@ class StateEstimatorComponent final : public Component {
   state_estimator::Config config_;
   std::unique_ptr<StateEstimator> estimator_;
   std::array<Pose, 2> odometry_axes_;
-  std::array<Arrivals, 3> arrivals_;
+  std::array<Arrivals, 4> arrivals_;
+  std::optional<state_estimator::Geodetic> geodetic_origin_;
+  std::optional<state_estimator::GnssFrame> gnss_frame_;
   std::int64_t last_output_ns_ = state_estimator::kNoStamp;
   double distance_ = 0.0;
   std::string reason_;
 
   Result<void> configure() override;
   Result<void> activate() override;
+  Result<void> configure_start_and_gnss();
   void on_odometry(int sensor, const Odometry& message);
   void on_imu(const Imu& message);
+  void on_fix(const NavSatFix& message);
   void note(std::size_t input, std::int64_t stamp_ns, std::int64_t head_ns, Verdict verdict);
   void publish();
   void publish_transform(const Odometry& message);
@@ -146,6 +167,7 @@ Result<void> StateEstimatorComponent::configure() {
   for (auto& o : config_.odometries) o.odometry.max_interval_s = max_interval_;
   config_.imu.enabled = use_imu_;
   config_.imu.body_from_sensor = *imu;
+  if (Result<void> fine = configure_start_and_gnss(); !fine) return fine;
   config_.outage_s = std::max(config_.outage_s, max_interval_.value());
   config_.replay.history_s = std::max(config_.replay.history_s, 2.0 * max_interval_);
   config_.clock_jump_s = 0.2;  // this clock's readings are in order: what goes back is a step
@@ -154,11 +176,36 @@ Result<void> StateEstimatorComponent::configure() {
   return {};
 }
 
+Result<void> StateEstimatorComponent::configure_start_and_gnss() {
+  const auto numbers = [](const Param<Numbers>& param, std::size_t count, const char* what) -> Result<void> {
+    const bool finite =
+        std::all_of(param.value().begin(), param.value().end(), [](double v) { return std::isfinite(v); });
+    if (finite && param.value().size() == count) return {};
+    return Error{ErrorCode::invalid_argument, param.name() + ": expected " + what};
+  };
+  if (Result<void> fine = numbers(initial_pose_, 3, "x y heading"); !fine) return fine;
+  if (Result<void> fine = numbers(gnss_antenna_, 2, "x y"); !fine) return fine;
+  geodetic_origin_.reset();
+  if (!gnss_origin_.value().empty()) {
+    if (Result<void> fine = numbers(gnss_origin_, 3, "latitude longitude altitude"); !fine) return fine;
+    geodetic_origin_ = {gnss_origin_.value()[0], gnss_origin_.value()[1], gnss_origin_.value()[2]};
+  }
+  config_.initial.x = initial_pose_.value()[0];
+  config_.initial.y = initial_pose_.value()[1];
+  config_.initial.yaw = initial_pose_.value()[2];
+  config_.initial.speed = initial_speed_;
+  config_.initial.sigma_speed = initial_speed_sigma_;
+  config_.gnss.enabled = config_.gnss.enabled || use_gnss_;
+  config_.gnss.lever_arm = {gnss_antenna_.value()[0], gnss_antenna_.value()[1]};
+  return {};
+}
+
 Result<void> StateEstimatorComponent::activate() {
   Result<std::unique_ptr<StateEstimator>> made = StateEstimator::create(config_);
   if (!made) return made.error();
   estimator_ = std::move(*made);
   arrivals_ = {};
+  gnss_frame_.emplace(state_estimator::GnssFrame::Config{.baseline_m = gnss_baseline_});
   last_output_ns_ = state_estimator::kNoStamp;
   distance_ = 0.0;
   reason_.clear();
@@ -201,6 +248,36 @@ void StateEstimatorComponent::on_imu(const Imu& message) {
   sample.specific_force = {a.x, a.y, a.z};
   const std::int64_t head = estimator_->state().stamp_ns;
   note(2, sample.stamp_ns, head, estimator_->add_imu(sample, nanoseconds(clock().now())));
+}
+
+void StateEstimatorComponent::on_fix(const NavSatFix& message) {
+  if (!config_.gnss.enabled) return;
+  const auto& c = message.position_covariance;
+  const bool fixed = message.status.status >= 0 && message.position_covariance_type != 0 &&
+                     std::isfinite(message.latitude) && std::isfinite(message.longitude) &&
+                     std::isfinite(message.altitude);
+  if (!fixed) return;
+  const state_estimator::Geodetic place{message.latitude, message.longitude, message.altitude};
+  if (!geodetic_origin_) geodetic_origin_ = place;
+  const Eigen::Vector2d local = state_estimator::to_local(*geodetic_origin_, place).head<2>();
+  const Eigen::Matrix2d covariance = (Eigen::Matrix2d() << c[0], c[1], c[3], c[4]).finished();
+  state_estimator::GnssSample sample;
+  sample.stamp_ns = nanoseconds(to_time(message.header.stamp));
+  if (!gnss_frame_->aligned()) {
+    const std::optional<Estimate> then = estimator_->estimate(sample.stamp_ns);
+    if (!then) return;
+    const Eigen::Vector3d arm(config_.gnss.lever_arm.x(), config_.gnss.lever_arm.y(), 0.0);
+    const double sigma = std::sqrt(std::max(covariance(0, 0), covariance(1, 1)));
+    if (gnss_frame_->add(local, sigma, (then->pose * arm).head<2>())) {
+      log().info("odom's x axis lies {:.2f} degrees left of east", gnss_frame_->heading() * 180.0 / M_PI);
+    }
+    return;
+  }
+  const state_estimator::GnssFrame::Fix fix = gnss_frame_->to_odom(local, covariance);
+  sample.position = fix.position;
+  sample.covariance = fix.covariance;
+  const std::int64_t head = estimator_->state().stamp_ns;
+  note(3, sample.stamp_ns, head, estimator_->add_gnss(sample, nanoseconds(clock().now())));
 }
 
 void StateEstimatorComponent::note(std::size_t input, std::int64_t stamp_ns, std::int64_t head_ns, Verdict verdict) {
@@ -329,9 +406,10 @@ void StateEstimatorComponent::report(const Estimate& estimate, std::int64_t now)
   message->sensors.clear();
   for (const SensorReport& r : s.sensors) {
     if (r.name == "zero_velocity") message->stationary = r.age_s >= 0.0 && r.age_s < 0.3;
-    const bool input = r.name == "lidar" || r.name == "thermal" || r.name == "imu";
-    if (!input) continue;
-    fill(r, r.name == "lidar" ? 0 : r.name == "thermal" ? 1 : 2, now, message->sensors.emplace_back());
+    constexpr std::array<std::string_view, 4> inputs{"lidar", "thermal", "imu", "gnss"};
+    const auto input = std::find(inputs.begin(), inputs.end(), r.name);
+    if (input == inputs.end()) continue;
+    fill(r, static_cast<std::size_t>(input - inputs.begin()), now, message->sensors.emplace_back());
   }
   status_.publish(std::move(message));
 }
