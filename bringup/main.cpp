@@ -17,6 +17,8 @@ int main(int argc, char** argv) {
 #endif
 #ifdef ADIT_HAS_SIMULATOR
   adit::add_simulate_command(app, code);
+  adit::add_run_offline_command(app, code);
+  adit::add_suite_command(app, code);
 #endif
   CLI11_PARSE(app, argc, argv);
   return code;

@@ -14,6 +14,8 @@ namespace adit {
 using ExitCode = int;
 
 void add_run_command(CLI::App& app, ExitCode& code);
+void add_run_offline_command(CLI::App& app, ExitCode& code);
+void add_suite_command(CLI::App& app, ExitCode& code);
 void add_host_command(CLI::App& app, ExitCode& code);
 void add_odometry_command(CLI::App& app, ExitCode& code);
 void add_thermal_odometry_command(CLI::App& odometry, ExitCode& code);
