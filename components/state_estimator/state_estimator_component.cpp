@@ -92,7 +92,7 @@ class StateEstimatorComponent final : public Component {
                   [this](const Imu& message, const MessageInfo&) { on_imu(message); }};
   Input<NavSatFix> fix_{*this, "fix", Qos::sensor(), Queue{20, WhenFull::drop_oldest},
                         [this](const NavSatFix& message, const MessageInfo&) { on_fix(message); }};
-  Timer output_{*this, "output", std::chrono::milliseconds(10), [this] { publish(); }};
+  Timer output_{*this, "output", std::chrono::milliseconds(10), [this](const TimerTick& tick) { on_tick(tick); }};
 
   // What the estimator does not keep of an input: lidar, thermal, imu, gnss.
   struct Arrivals {
@@ -117,7 +117,8 @@ class StateEstimatorComponent final : public Component {
   void on_imu(const Imu& message);
   void on_fix(const NavSatFix& message);
   void note(std::size_t input, std::int64_t stamp_ns, std::int64_t head_ns, Verdict verdict);
-  void publish();
+  void on_tick(const TimerTick& tick);
+  void publish(std::int64_t now);
   void publish_transform(const Odometry& message);
   void report(const Estimate& estimate, std::int64_t now);
   void fill(const SensorReport& report, std::size_t input, std::int64_t now, SensorStatus& out) const;
@@ -285,8 +286,18 @@ void StateEstimatorComponent::note(std::size_t input, std::int64_t stamp_ns, std
   if (verdict == Verdict::fused && stamp_ns < head_ns) ++arrivals_[input].late;
 }
 
-void StateEstimatorComponent::publish() {
-  const std::int64_t now = nanoseconds(clock().now());
+// Simulated time comes in steps that may be longer than a period: what was due in between is published too.
+void StateEstimatorComponent::on_tick(const TimerTick& tick) {
+  constexpr std::uint64_t most = 50;
+  const std::int64_t period = output_.period().count();
+  const std::uint64_t before = clock().simulated() ? std::min(tick.missed, most) : 0;
+  for (std::uint64_t i = before; i > 0; --i) {
+    publish(nanoseconds(tick.scheduled) - static_cast<std::int64_t>(i) * period);
+  }
+  publish(nanoseconds(clock().simulated() ? tick.scheduled : tick.now));
+}
+
+void StateEstimatorComponent::publish(std::int64_t now) {
   const std::optional<Estimate> estimate = estimator_->publish(now);
   if (!estimate) return;
   const double step =
