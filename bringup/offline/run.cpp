@@ -17,6 +17,10 @@ bool is_source(const ComponentConfig& component) {
   return component.type == "tunnel_simulator" || component.type == "dataset_player" || component.type == "barrier";
 }
 
+bool is_scenario(const std::string& input) {
+  return std::filesystem::path(input).extension() == ".yaml";
+}
+
 // Passes messages on and watches the time go by.
 class Watched final : public OfflineSource {
  public:
@@ -61,7 +65,7 @@ Result<RunOutcome> run(const RunRequest& request) {
   DeploymentOverrides overrides = request.overrides;
   overrides.variables.emplace("OUT", request.out);
   overrides.variables.emplace("SCENARIO", request.input);
-  if (std::filesystem::is_regular_file(request.input)) {
+  if (is_scenario(request.input)) {
     overrides.variables.emplace("VEHICLE", vehicle_of(request.input));
   }
   const Result<Deployment> deployment = load_deployment(request.deployment, overrides);
@@ -98,7 +102,7 @@ Result<RunOutcome> run(const RunRequest& request) {
 Result<evaluation::RunFolder> evaluate_run(const std::string& folder, const std::string& input,
                                            evaluation::ReportOptions& report) {
   evaluation::Options options;
-  if (std::filesystem::is_regular_file(input)) {
+  if (is_scenario(input)) {
     if (Result<void> described = describe_scenario(input, options, report); !described) return described.error();
   }
   Result<evaluation::RunFolder> run = evaluation::evaluate_folder(folder, options);

@@ -27,12 +27,16 @@ class Source : public OfflineSource {
   virtual Time end() const = 0;
 };
 
-// By what the path is: a scenario file (.yaml), or a folder of clouds (components/dataset). Errors name the path.
+// By what the path is: a scenario file (.yaml), a rosbag2 bag (its folder or .db3 file), or a folder of clouds
+// (components/dataset). Errors name the path.
 Result<std::unique_ptr<Source>> open_source(const std::string& path, const SourceOptions& options);
 
 // The simulator, without its component: samples in the order of their arrival. Every topic of the sensors, and
 // /ground_truth/odometry.
 Result<std::unique_ptr<Source>> open_scenario(const std::string& path, const SourceOptions& options);
+
+// A recording, its samples by the stamps of their arrival.
+Result<std::unique_ptr<Source>> open_bag(const std::string& path, const SourceOptions& options);
 
 // Clouds of a folder on /lidar/points; its gt_base.tum, when there is one, on /ground_truth/odometry.
 Result<std::unique_ptr<Source>> open_folder(const std::string& path, const SourceOptions& options);

@@ -3,36 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/state_estimator/initial_state.hpp"
+
 namespace adit::state_estimator {
 namespace {
 
 double square(double value) {
   return value * value;
-}
-
-FilterState initial_state(const InitialState& initial, const Config& config, std::int64_t stamp_ns) {
-  FilterState s;
-  s.stamp_ns = stamp_ns;
-  s.x(kX) = initial.x;
-  s.x(kY) = initial.y;
-  s.x(kYaw) = wrap_angle(initial.yaw);
-  s.x(kSpeed) = initial.speed;
-  const auto sigma = [&](int index, double value) { s.p(index, index) = value * value; };
-  sigma(kX, initial.sigma_position);
-  sigma(kY, initial.sigma_position);
-  sigma(kYaw, initial.sigma_yaw);
-  sigma(kSpeed, initial.sigma_speed);
-  sigma(kAccel, initial.sigma_accel);
-  sigma(kYawRate, initial.sigma_yaw_rate);
-  sigma(kYawAccel, initial.sigma_yaw_accel);
-  // Calibration states live only where a sensor can show them.
-  for (const OdometrySensor& o : config.odometries) {
-    if (o.odometry.calibration.scale) sigma(kScale, initial.sigma_scale);
-    if (o.odometry.calibration.yaw_bias) sigma(kThermalYawBias, initial.sigma_thermal_yaw_bias);
-  }
-  if (config.imu.enabled) sigma(kGyroBias, config.imu.yaw_rate_bias);
-  if (config.imu.enabled && config.imu.use_acceleration) sigma(kAccelBias, config.imu.acceleration_bias);
-  return s;
 }
 
 // The rotation without its heading: body axes to levelled axes.
@@ -41,24 +18,6 @@ Eigen::Matrix3d level_of(const Eigen::Matrix3d& rotation) {
 }
 
 }  // namespace
-
-const char* to_string(Mode mode) {
-  switch (mode) {
-    case Mode::initializing:
-      return "initializing";
-    case Mode::fused:
-      return "fused";
-    case Mode::lidar:
-      return "lidar";
-    case Mode::thermal:
-      return "thermal";
-    case Mode::other:
-      return "other";
-    case Mode::dead_reckoning:
-      return "dead_reckoning";
-  }
-  return "?";
-}
 
 Result<std::unique_ptr<StateEstimator>> StateEstimator::create(const Config& config) {
   if (Result<void> ok = check(config); !ok) return ok.error();
@@ -70,7 +29,8 @@ StateEstimator::StateEstimator(const Config& config)
       replay_(filter_, config.replay),
       map_(config.map_correction),
       tilt_(config.imu.tilt),
-      standstill_(config.imu.standstill) {
+      standstill_(config.imu.standstill),
+      smoother_({config.largest_jump_m, config.largest_jump_rad, config.smoothing_s}) {
   filter_.process = config.process;
   filter_.gate = config.gate;
   filter_.disagreement = config.disagreement;
@@ -124,7 +84,7 @@ int StateEstimator::sensor(const std::string& name) const {
 }
 
 void StateEstimator::start(std::int64_t now_ns) {
-  replay_.restart(initial_state(config_.initial, config_, now_ns));
+  replay_.restart(initial_state(config_, now_ns));
   started_ = true;
 }
 
@@ -134,26 +94,12 @@ void StateEstimator::restart_at(std::int64_t stamp_ns, std::int64_t pose_of_ns) 
   // No further ahead than a silence may be: beyond, the covariance only loses digits.
   const std::int64_t silence_ns = static_cast<std::int64_t>(config_.longest_silence_s * 1e9);
   predict(old, pose_of_ns - old.stamp_ns > silence_ns ? old.stamp_ns + silence_ns : pose_of_ns, filter_.process);
-  FilterState fresh = initial_state(config_.initial, config_, stamp_ns);
-  constexpr int kept[] = {kX, kY, kYaw, kScale, kThermalYawBias, kGyroBias, kAccelBias};
-  for (const int i : kept) {
-    fresh.x(i) = old.x(i);
-    for (const int j : kept) fresh.p(i, j) = old.p(i, j);
-  }
-  for (std::size_t i = 0; i < old.sensors.size(); ++i) {
-    SensorState& s = fresh.sensors[i];
-    s = old.sensors[i];
-    s.last_accepted_ns = s.last_received_ns = kNoStamp;
-    s.window = MotionWindow{};
-    s.is_distrusted = false;
-    s.consecutive_rejections = 0;
-  }
-  replay_.restart(fresh);
+  replay_.restart(without_motion(old, config_, stamp_ns));
   for (Odometry& o : odometries_) o.anchor = o.previous = std::nullopt;
   tilt_ = Tilt(config_.imu.tilt);
   standstill_ = StandstillDetector(config_.imu.standstill);
   published_ns_ = zero_velocity_ns_ = height_ns_ = closure_ns_ = kNoStamp;
-  last_output_ = std::nullopt;
+  smoother_.restart();
 }
 
 bool StateEstimator::watch_clock(std::int64_t now_ns) {
@@ -418,34 +364,17 @@ MapCorrection::Outcome StateEstimator::add_closure(std::int64_t stamp_ns, const 
   return outcome;
 }
 
-Estimate StateEstimator::to_estimate(const FilterState& state) const {
-  Estimate e;
-  e.stamp_ns = state.stamp_ns;
+Estimate StateEstimator::estimate_of(const FilterState& state) const {
   // An odometry's roll and pitch are smoother than the IMU's, which shakes with the body; without one, the IMU's.
   const bool from_odometry =
       height_ns_ != kNoStamp && seconds_between(height_ns_, state.stamp_ns) < 2.0 * config_.outage_s;
-  const Eigen::Matrix3d level = tilt_.ready() && !from_odometry ? tilt_.level() : tilt_from_odometry_;
-  e.pose.linear() = so3_exp({0.0, 0.0, state.x(kYaw)}) * level;
-  e.pose.translation() = Eigen::Vector3d(state.x(kX), state.x(kY), height_);
-  e.speed = state.x(kSpeed);
-  e.accel = state.x(kAccel);
-  e.yaw_rate = state.x(kYawRate);
-  e.yaw_accel = state.x(kYawAccel);
-  constexpr int pose[3] = {kX, kY, kYaw};
-  constexpr int twist[2] = {kSpeed, kYawRate};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) e.pose_covariance(i, j) = state.p(pose[i], pose[j]);
-  }
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) e.twist_covariance(i, j) = state.p(twist[i], twist[j]);
-  }
-  return e;
+  return to_estimate(state, height_, tilt_.ready() && !from_odometry ? tilt_.level() : tilt_from_odometry_);
 }
 
 std::optional<Estimate> StateEstimator::estimate(std::int64_t stamp_ns) const {
   if (!started_) return std::nullopt;
   const std::optional<FilterState> state = replay_.state_at(stamp_ns);
-  return state ? std::optional<Estimate>(to_estimate(*state)) : std::nullopt;
+  return state ? std::optional<Estimate>(estimate_of(*state)) : std::nullopt;
 }
 
 std::optional<Estimate> StateEstimator::publish(std::int64_t now_ns) {
@@ -454,39 +383,8 @@ std::optional<Estimate> StateEstimator::publish(std::int64_t now_ns) {
   std::optional<Estimate> e = estimate(now_ns);
   if (!e) return e;
   published_ns_ = now_ns;
-  smooth(*e);
+  smoother_.apply(*e);
   return e;
-}
-
-// The part of a correction beyond the permitted jump is taken off the output and given back over smoothing_s.
-void StateEstimator::smooth(Estimate& e) {
-  const Estimate raw = e;
-  if (config_.smoothing_s > 0.0 && last_output_) {
-    const double dt = seconds_between(last_output_->stamp_ns, e.stamp_ns);
-    const PlanarPose before(last_output_->pose.translation().x(), last_output_->pose.translation().y(),
-                            yaw(last_output_->pose.linear()));
-    const double turn = last_output_->yaw_rate * dt;
-    const PlanarPose expected = compose(before, {last_output_->speed * dt * std::cos(0.5 * turn),
-                                                 last_output_->speed * dt * std::sin(0.5 * turn), turn});
-    const PlanarPose now(e.pose.translation().x(), e.pose.translation().y(), yaw(e.pose.linear()));
-    PlanarPose jump = now - expected;
-    jump.z() = wrap_angle(jump.z());
-    not_yet_shown_ *= std::exp(-dt / config_.smoothing_s);
-    // Seldom outputs (several hundred ms apart) move on by themselves: what they do in between is no jump.
-    const double distance = jump.head<2>().norm();
-    const bool often = dt < 0.3;
-    if (often && distance > config_.largest_jump_m) {
-      not_yet_shown_.head<2>() -= jump.head<2>() * (1.0 - config_.largest_jump_m / distance);
-    }
-    if (often && std::abs(jump.z()) > config_.largest_jump_rad) {
-      not_yet_shown_.z() -= jump.z() * (1.0 - config_.largest_jump_rad / std::abs(jump.z()));
-    }
-    e.pose.translation().head<2>() += not_yet_shown_.head<2>();
-    e.pose.linear() = so3_exp({0.0, 0.0, not_yet_shown_.z()}) * e.pose.linear();
-  } else {
-    not_yet_shown_.setZero();
-  }
-  last_output_ = raw;
 }
 
 std::optional<RelativePrediction> StateEstimator::predict_motion(std::int64_t from_ns, std::int64_t to_ns) const {
@@ -525,20 +423,8 @@ Status StateEstimator::status(std::int64_t now_ns) const {
   for (int i = 0; i < filter_.sensor_count(); ++i) {
     const SensorState& s = head.sensors[static_cast<std::size_t>(i)];
     const Counters& c = counters_[static_cast<std::size_t>(i)];
-    SensorReport& r = status.sensors.emplace_back();
-    r.name = names_[static_cast<std::size_t>(i)];
-    if (s.last_accepted_ns != kNoStamp) r.age_s = seconds_between(s.last_accepted_ns, now_ns);
-    r.distrusted = s.is_distrusted;
-    r.healthy = s.last_accepted_ns != kNoStamp && r.age_s <= config_.outage_s && !s.is_distrusted;
-    r.nis = s.nis;
-    r.nis_dof = s.nis_dof;
-    r.mean_nis_per_dof = s.examined > 0 ? s.nis_per_dof_sum / static_cast<double>(s.examined) : 0.0;
-    r.accepted = s.accepted;
-    r.rejected = s.rejected;
-    r.distrusted_count = s.distrusted;
-    r.unanchored = s.unanchored;
-    r.uninformative = s.uninformative;
-    r.forced = s.forced;
+    SensorReport& r =
+        status.sensors.emplace_back(report_of(names_[static_cast<std::size_t>(i)], s, now_ns, config_.outage_s));
     r.too_old = c.too_old;
     r.duplicates = c.duplicates;
     r.future = c.future;

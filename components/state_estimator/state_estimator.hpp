@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "components/state_estimator/config.hpp"
+#include "components/state_estimator/estimate.hpp"
 #include "components/state_estimator/replay_buffer.hpp"
+#include "components/state_estimator/status.hpp"
 
 namespace adit::state_estimator {
 
@@ -48,45 +50,12 @@ struct GnssSample {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();  // m^2
 };
 
-enum class Mode { initializing, fused, lidar, thermal, other, dead_reckoning };
-const char* to_string(Mode mode);
-
-struct Estimate {
-  std::int64_t stamp_ns = kNoStamp;
-  Pose pose = Pose::Identity();  // base_link in odom: planar position and heading by the filter; height, roll and
-                                 // pitch carried over from the odometry and the IMU
-  double speed = 0.0, accel = 0.0, yaw_rate = 0.0, yaw_accel = 0.0;
-  Eigen::Matrix3d pose_covariance = Eigen::Matrix3d::Zero();   // (x, y, yaw) in odom
-  Eigen::Matrix2d twist_covariance = Eigen::Matrix2d::Zero();  // (speed, yaw rate)
-};
-
 // Motion between two instants with the covariance of exactly this motion: the prior for a front end. It contains what
 // the same front end delivered before `to`; a front end that optimizes with it must hand back the likelihood alone.
 struct RelativePrediction {
   PlanarPose motion = PlanarPose::Zero();  // base_link at `to` in base_link at `from`
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   double thermal_scale = 1.0;  // thermal length / true length
-};
-
-struct SensorReport {
-  std::string name;
-  bool healthy = false;  // fused something within outage_s and not distrusted
-  bool distrusted = false;
-  double age_s = -1.0;  // since the last fused measurement; negative: never
-  double nis = 0.0;     // of the last examined measurement,
-  int nis_dof = 0;      // with so many rows
-  double mean_nis_per_dof = 0.0;
-  std::uint64_t accepted = 0, rejected = 0, distrusted_count = 0, unanchored = 0, uninformative = 0, forced = 0;
-  std::uint64_t too_old = 0, duplicates = 0, future = 0, malformed = 0, gaps = 0, jumps = 0;
-};
-
-struct Status {
-  Mode mode = Mode::initializing;
-  bool conflict = false;
-  double thermal_scale = 1.0, thermal_scale_sigma = 0.0;
-  std::uint64_t clock_jumps = 0, forgotten_motions = 0, replays = 0;
-  std::uint64_t closures = 0, closures_rejected = 0;
-  std::vector<SensorReport> sensors;
 };
 
 // Not thread safe: one strand. No heap after construction, but for status(). `now_ns` is the caller's clock at the
@@ -138,11 +107,10 @@ class StateEstimator {
   Verdict count(int sensor, Verdict verdict);
   bool watch_clock(std::int64_t now_ns);
   void restart_at(std::int64_t stamp_ns, std::int64_t pose_of_ns);
-  void smooth(Estimate& estimate);
   Verdict insert(const Measurement& measurement, std::int64_t now_ns);
   void maybe_stand_still(std::int64_t stamp_ns, std::int64_t now_ns);
   void carry_attitude(const Odometry& odometry, const Pose& from, const OdometrySample& to);
-  Estimate to_estimate(const FilterState& state) const;
+  Estimate estimate_of(const FilterState& state) const;
 
   Config config_;
   Filter filter_;
@@ -158,8 +126,7 @@ class StateEstimator {
   std::int64_t now_ns_ = kNoStamp, published_ns_ = kNoStamp, zero_velocity_ns_ = kNoStamp;
   std::int64_t closure_ns_ = kNoStamp;
   std::uint64_t clock_jumps_ = 0, forgotten_motions_ = 0, replays_ = 0;
-  std::optional<Estimate> last_output_;            // before smoothing
-  PlanarPose not_yet_shown_ = PlanarPose::Zero();  // output minus estimate
+  OutputSmoother smoother_;
   double height_ = 0.0;
   int height_from_ = -1;
   std::int64_t height_ns_ = kNoStamp;

@@ -8,7 +8,7 @@
 #include "adit_msgs/msg/fusion_status.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
-#include "components/state_estimator/correction.hpp"
+#include "components/state_estimator/component_messages.hpp"
 #include "components/state_estimator/gnss_frame.hpp"
 #include "components/state_estimator/state_estimator.hpp"
 #include "nav_msgs/msg/odometry.hpp"
@@ -20,20 +20,17 @@ namespace adit {
 namespace {
 
 using adit_msgs::msg::FusionStatus;
-using adit_msgs::msg::SensorStatus;
 using nav_msgs::msg::Odometry;
 using sensor_msgs::msg::Imu;
 using sensor_msgs::msg::NavSatFix;
 using state_estimator::Estimate;
-using state_estimator::SensorReport;
 using state_estimator::StateEstimator;
 using state_estimator::Verdict;
 using tf2_msgs::msg::TFMessage;
 
 enum class Preset { paper, predecessor, standard };
 enum class OdometryFrame { sensor, level };
-
-constexpr double not_estimated = 1e6;  // variance of height, roll and pitch: they are carried along, not filtered
+enum class Switch { preset, on, off };
 
 std::int64_t nanoseconds(Time time) {
   return time.time_since_epoch().count();
@@ -43,6 +40,7 @@ std::int64_t nanoseconds(Time time) {
 class StateEstimatorComponent final : public Component {
   using Numbers = std::vector<double>;
   inline static const Numbers identity{0, 0, 0, 0, 0, 0, 1};
+  inline static const Choices<Switch> switches{{"preset", Switch::preset}, {"on", Switch::on}, {"off", Switch::off}};
   inline static const Choices<OdometryFrame> frames{{"sensor", OdometryFrame::sensor}, {"level", OdometryFrame::level}};
 
   Param<Preset> mode_{
@@ -73,6 +71,16 @@ class StateEstimatorComponent final : public Component {
       *this, "gnss_origin", {}, "latitude, longitude [deg], altitude [m] of the local frame; empty: the first fix"};
   Param<double> gnss_baseline_{*this,       "gnss_baseline",    40.0,
                                Unit::metre, Range{5.0, 1000.0}, "driven with fixes before they are fused"};
+  Param<Switch> relative_poses_{*this, "relative_poses", Switch::preset, switches,
+                                "odometries are fused as relative poses (off: as speed and yaw rate)"};
+  Param<Switch> thermal_calibration_{*this, "thermal_calibration", Switch::preset, switches,
+                                     "estimate scale and yaw bias of the thermal odometry"};
+  Param<Switch> gates_{*this, "gates", Switch::preset, switches, "chi-square gates and the disagreement test"};
+  Param<double> thermal_scale_sigma_{*this, "thermal_scale_sigma", 0.1, Range{1e-4, 10.0},
+                                     "of ln(scale) at the start: 0.02 with LiDAR depth"};
+  Param<double> lidar_anchor_period_{
+      *this,        "lidar_anchor_period", 0.0,
+      Unit::second, Range{0.0, 10.0},      "LiDAR poses are fused relative to one this old; 0: to the one before"};
   Param<Numbers> initial_pose_{*this, "initial_pose", Numbers{0, 0, 0}, "in odom_frame: x y [m], heading [rad]"};
   Param<double> initial_speed_{
       *this, "initial_speed", 0.0, Unit::metre_per_second, Range{-60.0, 60.0}, "when the first measurement comes"};
@@ -94,16 +102,10 @@ class StateEstimatorComponent final : public Component {
                         [this](const NavSatFix& message, const MessageInfo&) { on_fix(message); }};
   Timer output_{*this, "output", std::chrono::milliseconds(10), [this](const TimerTick& tick) { on_tick(tick); }};
 
-  // What the estimator does not keep of an input: lidar, thermal, imu, gnss.
-  struct Arrivals {
-    std::int64_t last_ns = state_estimator::kNoStamp;
-    std::uint64_t late = 0;
-  };
-
   state_estimator::Config config_;
   std::unique_ptr<StateEstimator> estimator_;
   std::array<Pose, 2> odometry_axes_;
-  std::array<Arrivals, 4> arrivals_;
+  state_estimator::Arrivals arrivals_;
   std::optional<state_estimator::Geodetic> geodetic_origin_;
   std::optional<state_estimator::GnssFrame> gnss_frame_;
   std::int64_t last_output_ns_ = state_estimator::kNoStamp;
@@ -121,42 +123,16 @@ class StateEstimatorComponent final : public Component {
   void publish(std::int64_t now);
   void publish_transform(const Odometry& message);
   void report(const Estimate& estimate, std::int64_t now);
-  void fill(const SensorReport& report, std::size_t input, std::int64_t now, SensorStatus& out) const;
 };
-
-Result<Pose> pose_of(const Param<std::vector<double>>& param) {
-  const std::vector<double>& v = param.value();
-  if (v.size() != 7) {
-    return Error{ErrorCode::invalid_argument, param.name() + ": 7 numbers are wanted: x y z qx qy qz qw"};
-  }
-  const bool finite = Eigen::Map<const Eigen::Matrix<double, 7, 1>>(v.data()).allFinite();
-  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-  if (!finite || !(std::abs(q.norm() - 1.0) < 0.01)) {
-    return Error{ErrorCode::invalid_argument, param.name() + ": not finite, or the quaternion's norm is not 1"};
-  }
-  Pose pose = Pose::Identity();
-  pose.linear() = q.normalized().toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
-  return pose;
-}
-
-// nav_msgs/Odometry has the covariance about the axes of the parent frame; the estimator takes the information of the
-// right perturbation. All zero means unknown; what is no covariance is not used either.
-std::optional<Matrix6d> reported_information(const Odometry& message, const Eigen::Matrix3d& rotation) {
-  const Matrix6d covariance =
-      Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message.pose.covariance.data());
-  if (!covariance.allFinite()) return std::nullopt;
-  Matrix6d to_sensor = Matrix6d::Zero();
-  to_sensor.topLeftCorner<3, 3>() = to_sensor.bottomRightCorner<3, 3>() = rotation.transpose();
-  return state_estimator::information_from_covariance(to_sensor * covariance * to_sensor.transpose());
-}
 
 Result<void> StateEstimatorComponent::configure() {
   using state_estimator::Config;
   config_ = mode_ == Preset::paper         ? Config::paper()
             : mode_ == Preset::predecessor ? Config::predecessor()
                                            : Config::standard();
-  const Result<Pose> lidar = pose_of(lidar_pose_), thermal = pose_of(thermal_pose_), imu = pose_of(imu_pose_);
+  const Result<Pose> lidar = state_estimator::pose_of(lidar_pose_, "lidar_pose"),
+                     thermal = state_estimator::pose_of(thermal_pose_, "thermal_pose"),
+                     imu = state_estimator::pose_of(imu_pose_, "imu_pose");
   for (const Result<Pose>* pose : {&lidar, &thermal, &imu}) {
     if (!*pose) return pose->error();
   }
@@ -165,7 +141,17 @@ Result<void> StateEstimatorComponent::configure() {
   // A frame with the axes of the sensor at its start becomes the body's at its start, which is taken to be level.
   odometry_axes_ = {lidar_frame_ == OdometryFrame::sensor ? *lidar : Pose::Identity(),
                     thermal_frame_ == OdometryFrame::sensor ? *thermal : Pose::Identity()};
-  for (auto& o : config_.odometries) o.odometry.max_interval_s = max_interval_;
+  for (auto& o : config_.odometries) {
+    o.odometry.max_interval_s = max_interval_;
+    if (relative_poses_ != Switch::preset) o.odometry.relative_pose = relative_poses_ == Switch::on;
+  }
+  config_.odometries[0].odometry.anchor_period_s = lidar_anchor_period_;
+  if (thermal_calibration_ != Switch::preset) {
+    const bool on = thermal_calibration_ == Switch::on;
+    config_.odometries[1].odometry.calibration = {.scale = on, .yaw_bias = on};
+  }
+  config_.initial.sigma_scale = thermal_scale_sigma_;
+  if (gates_ != Switch::preset) config_.gate.enabled = config_.disagreement.enabled = gates_ == Switch::on;
   config_.imu.enabled = use_imu_;
   config_.imu.body_from_sensor = *imu;
   if (Result<void> fine = configure_start_and_gnss(); !fine) return fine;
@@ -234,7 +220,7 @@ void StateEstimatorComponent::on_odometry(int sensor, const Odometry& message) {
   sample.pose = odometry_axes_[index] * pose;
   sample.frame = std::hash<std::string>{}(message.header.frame_id);
   const bool use_covariance = sensor == 0 ? lidar_covariance_ : thermal_covariance_;
-  if (use_covariance && unit) sample.information = reported_information(message, pose.linear());
+  if (use_covariance && unit) sample.information = state_estimator::reported_information(message, pose.linear());
   const std::int64_t head = estimator_->state().stamp_ns;
   note(index, sample.stamp_ns, head, estimator_->add_odometry(sensor, sample, nanoseconds(clock().now())));
 }
@@ -305,28 +291,11 @@ void StateEstimatorComponent::publish(std::int64_t now) {
   distance_ += std::abs(estimate->speed) * std::clamp(step, 0.0, 1.0);
   last_output_ns_ = now;
 
-  const Eigen::Quaterniond q(estimate->pose.linear());
-  const Eigen::Vector3d t = estimate->pose.translation();
   Loan<Odometry> message = odometry_.loan();
   message->header.stamp = to_stamp(Time(Duration(now)));
   message->header.frame_id = odom_frame_.value();
   message->child_frame_id = base_frame_.value();
-  message->pose.pose.position = {t.x(), t.y(), t.z()};
-  message->pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
-  message->twist.twist.linear = {estimate->speed, 0.0, 0.0};
-  message->twist.twist.angular = {0.0, 0.0, estimate->yaw_rate};
-  message->pose.covariance.fill(0.0);
-  message->twist.covariance.fill(0.0);
-  for (const std::size_t i : {2, 3, 4}) message->pose.covariance[7 * i] = not_estimated;
-  for (const std::size_t i : {1, 2, 3, 4}) message->twist.covariance[7 * i] = not_estimated;
-  constexpr std::size_t planar[3] = {0, 1, 5};
-  constexpr std::size_t motion[2] = {0, 5};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) message->pose.covariance[6 * planar[i] + planar[j]] = estimate->pose_covariance(i, j);
-  }
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) message->twist.covariance[6 * motion[i] + motion[j]] = estimate->twist_covariance(i, j);
-  }
+  state_estimator::fill(*estimate, *message);
   if (tf_.has_readers()) publish_transform(*message);
   odometry_.publish(std::move(message));
   report(*estimate, now);
@@ -344,84 +313,23 @@ void StateEstimatorComponent::publish_transform(const Odometry& message) {
   tf_.publish(std::move(tf));
 }
 
-void StateEstimatorComponent::fill(const SensorReport& report, std::size_t input, std::int64_t now,
-                                   SensorStatus& out) const {
-  using state_estimator::chi_square;
-  using state_estimator::Quantile;
-  const Arrivals& arrivals = arrivals_[input];
-  const bool arrives = arrivals.last_ns != state_estimator::kNoStamp &&
-                       state_estimator::seconds_between(arrivals.last_ns, now) <= config_.outage_s;
-  out.name = report.name;
-  out.health = !arrives            ? SensorStatus::ABSENT
-               : report.distrusted ? SensorStatus::FAULTY
-               : report.healthy    ? SensorStatus::HEALTHY
-                                   : SensorStatus::DEGRADED;
-  out.reason = !arrives            ? "no data"
-               : report.distrusted ? "contradicted by another sensor"
-               : report.healthy    ? ""
-                                   : "its data is not fused";
-  out.age = report.age_s;
-  out.nis = report.nis;
-  out.nis_mean = report.mean_nis_per_dof;
-  out.degrees_of_freedom = static_cast<std::uint8_t>(report.nis_dof);
-  const bool gated = config_.gate.enabled && report.nis_dof > 0;
-  out.gate = gated ? chi_square(report.nis_dof, Quantile::p99_9) : 0.0;
-  out.weight = report.healthy ? 1.0 : 0.0;
-  if (gated && report.healthy) {
-    const double certain = chi_square(report.nis_dof, Quantile::p95);
-    if (report.nis > out.gate) {
-      out.weight = 0.0;
-    } else if (config_.gate.robust && report.nis > certain) {
-      out.weight = std::sqrt(certain / report.nis);
-    }
-  }
-  out.accepted = report.accepted;
-  out.rejected = report.rejected + report.distrusted_count;
-  out.late = arrivals.late;
-  out.dropped = report.too_old + report.duplicates + report.future + report.malformed + report.gaps + report.jumps;
-}
-
 void StateEstimatorComponent::report(const Estimate& estimate, std::int64_t now) {
   using state_estimator::Mode;
-  const state_estimator::Status s = estimator_->status(now);
-  const bool began =
-      std::any_of(s.sensors.begin(), s.sensors.end(), [](const SensorReport& r) { return r.age_s >= 0; });
-  std::string reason = began ? to_string(s.mode) : "nothing measured yet";
-  if (s.conflict) reason += ", sensors contradict each other";
-  if (s.clock_jumps > 0) reason += ", " + std::to_string(s.clock_jumps) + " clock jumps";
+  const state_estimator::Status status = estimator_->status(now);
+  const bool began = state_estimator::began(status);
+  std::string reason = began ? to_string(status.mode) : "nothing measured yet";
+  if (status.conflict) reason += ", sensors contradict each other";
+  if (status.clock_jumps > 0) reason += ", " + std::to_string(status.clock_jumps) + " clock jumps";
   if (reason != reason_) {
     reason_ = reason;
-    health(s.mode == Mode::fused && !s.conflict ? Health::ok : Health::warn, std::move(reason));
+    health(status.mode == Mode::fused && !status.conflict ? Health::ok : Health::warn, std::move(reason));
   }
   if (!status_.has_readers()) return;
-
   Loan<FusionStatus> message = status_.loan();
   message->header.stamp = to_stamp(Time(Duration(now)));
   message->header.frame_id = odom_frame_.value();
-  message->mode = !began                    ? FusionStatus::MODE_INITIALIZING
-                  : s.mode == Mode::fused   ? FusionStatus::MODE_FUSED
-                  : s.mode == Mode::lidar   ? FusionStatus::MODE_LIDAR
-                  : s.mode == Mode::thermal ? FusionStatus::MODE_THERMAL
-                                            : FusionStatus::MODE_DEAD_RECKONING;
-  message->thermal_scale = s.thermal_scale;
-  message->thermal_scale_sigma = s.thermal_scale_sigma;
-  message->replays = s.replays;
   message->distance = distance_;
-  const double heading = yaw(estimate.pose.linear());
-  const Eigen::Vector2d ahead(std::cos(heading), std::sin(heading)), left(-ahead.y(), ahead.x());
-  const Eigen::Matrix2d p = estimate.pose_covariance.topLeftCorner<2, 2>();
-  message->along_track_sigma = std::sqrt(std::max(0.0, ahead.dot(p * ahead)));
-  message->cross_track_sigma = std::sqrt(std::max(0.0, left.dot(p * left)));
-  message->yaw_sigma = std::sqrt(std::max(0.0, estimate.pose_covariance(2, 2)));
-  message->stationary = false;
-  message->sensors.clear();
-  for (const SensorReport& r : s.sensors) {
-    if (r.name == "zero_velocity") message->stationary = r.age_s >= 0.0 && r.age_s < 0.3;
-    constexpr std::array<std::string_view, 4> inputs{"lidar", "thermal", "imu", "gnss"};
-    const auto input = std::find(inputs.begin(), inputs.end(), r.name);
-    if (input == inputs.end()) continue;
-    fill(r, static_cast<std::size_t>(input - inputs.begin()), now, message->sensors.emplace_back());
-  }
+  state_estimator::fill(estimate, status, arrivals_, config_, now, *message);
   status_.publish(std::move(message));
 }
 

@@ -18,6 +18,7 @@
 #include "components/runtime/registry.hpp"
 #include "components/runtime/stamp.hpp"
 #include "nav_msgs/msg/odometry.hpp"
+#include "sensor_msgs/msg/nav_sat_fix.hpp"
 #include "tf2_msgs/msg/tf_message.hpp"
 
 namespace adit {
@@ -67,6 +68,10 @@ class Recording final : public OfflineSource {
   void add(const std::string& topic, Duration arrival, const Odometry& message) {
     messages_.push_back(offline_message<Odometry>(topic, Time(arrival), std::make_shared<const Odometry>(message)));
   }
+  void add_fix(const std::string& topic, Duration arrival, const sensor_msgs::msg::NavSatFix& message) {
+    using sensor_msgs::msg::NavSatFix;
+    messages_.push_back(offline_message<NavSatFix>(topic, Time(arrival), std::make_shared<const NavSatFix>(message)));
+  }
   void sort() {
     std::stable_sort(messages_.begin(), messages_.end(),
                      [](const OfflineMessage& a, const OfflineMessage& b) { return a.stamp < b.stamp; });
@@ -89,6 +94,7 @@ struct Drive {
   using Change = std::function<void(Odometry&, Duration& arrival, int index)>;
   Change change_lidar = nullptr;
   Change change_thermal = nullptr;
+  std::function<void(sensor_msgs::msg::NavSatFix&, double t)> fix = nullptr;  // 5 Hz where set
 
   Recording record() const {
     Recording recording;
@@ -104,6 +110,12 @@ struct Drive {
     };
     if (lidar) play("/lidar", 100ms, 70ms, change_lidar);
     if (thermal) play("/thermal", 40ms, 15ms, change_thermal);
+    for (int i = 0; fix && i * 200ms <= length; ++i) {
+      sensor_msgs::msg::NavSatFix message;
+      message.header.stamp = to_stamp(Time(begin + i * 200ms));
+      fix(message, 0.2 * i);
+      recording.add_fix("/fix", begin + i * 200ms + 100ms, message);
+    }
     recording.add("/elsewhere", begin + length, Odometry{});
     recording.sort();
     return recording;
@@ -386,6 +398,45 @@ TEST(StateEstimatorComponent, NamesAWrongParameter) {
   }
 }
 
+// An odometry 4 % short, and a receiver in a country where odom's x axis points 70 degrees north of east: the first 40
+// m show how the frames lie, from there on the fixes hold the position, but the one wrong by 30 m.
+TEST(StateEstimatorComponent, HoldsThePositionByFixes) {
+  constexpr double latitude = 47.0, longitude = 15.0, turn = 70.0 * M_PI / 180.0;
+  const double metres_east = 76056.7, metres_north = 111169.2;  // of a degree there (WGS 84)
+  Drive drive{.thermal = false, .length = 40s};
+  drive.change_lidar = [](Odometry& message, Duration&, int i) {
+    Pose pose = arc(0.1 * i);
+    if (0.1 * i > 14.0)
+      pose.translation() = arc(14.0).translation() + 0.96 * (pose.translation() - arc(14.0).translation());
+    message = odometry(to_time(message.header.stamp).time_since_epoch(), pose, "lidar");
+    set_covariance(message, {1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7});
+  };
+  drive.fix = [&](sensor_msgs::msg::NavSatFix& fix, double t) {
+    const Eigen::Vector3d p = arc(t).translation();
+    const double wrong = t > 30.0 && t < 31.0 ? 30.0 : 0.0;
+    fix.latitude = latitude + (std::sin(turn) * p.x() + std::cos(turn) * p.y() + wrong) / metres_north;
+    fix.longitude = longitude + (std::cos(turn) * p.x() - std::sin(turn) * p.y()) / metres_east;
+    fix.altitude = 300.0;
+    fix.status.status = 2;
+    fix.position_covariance = {4e-4, 0, 0, 0, 4e-4, 0, 0, 0, 4e-4};
+    fix.position_covariance_type = 2;
+  };
+  const Outcome without = run(drive), with = run(drive, {{"use_gnss", true}});
+  expect_continuous(with, 3999);
+  EXPECT_GT(error(without), 2.0);
+  EXPECT_LT(error(with), 0.4);
+  EXPECT_GT(with.sensor("gnss").accepted, 80u);
+  EXPECT_GE(with.sensor("gnss").rejected, 4u);
+  // No fix, no covariance, no number: nothing happens.
+  drive.fix = [&](sensor_msgs::msg::NavSatFix& fix, double t) {
+    fix.latitude = t < 10.0 ? std::nan("") : latitude;
+    fix.longitude = longitude;
+    fix.status.status = t < 20.0 ? 2 : -1;
+    fix.position_covariance_type = t < 20.0 && t > 10.0 ? 0 : 2;
+  };
+  EXPECT_EQ(run(drive, {{"use_gnss", true}}).sensor("gnss").accepted, 0u);
+}
+
 // A recording that starts over: the runner's time never goes back, so the component is driven by hand.
 TEST(StateEstimatorComponent, AClockThatJumpsBackKeepsThePoseAndGoesOn) {
   Clock clock(Clock::Source::simulated);
@@ -442,6 +493,37 @@ TEST(StateEstimatorComponent, AClockThatJumpsBackKeepsThePoseAndGoesOn) {
     EXPECT_NEAR(poses.back().twist.twist.linear.x, 2.49 * speed / 4.0, 0.1);
     EXPECT_EQ(status.back().mode, FusionStatus::MODE_FUSED);
     EXPECT_LT(to_time(poses.back().header.stamp).time_since_epoch(), back + 2500ms);
+  }
+  core.shutdown();
+}
+
+// A simulator that lets time go on in steps of 70 ms: consumers of the pose still get one each 10 ms.
+TEST(StateEstimatorComponent, PublishesWhatWasDueWithinAStepOfSimulatedTime) {
+  Clock clock(Clock::Source::simulated);
+  LocalBus bus;
+  InlineScheduler scheduler;
+  auto component = components::create("state_estimator");
+  ASSERT_TRUE(component);
+  ComponentCore& core = (*component)->core();
+  ASSERT_TRUE(core.bind(estimator(), std::make_shared<LogSink>()));
+  Environment environment;
+  environment.bus = &bus;
+  environment.clock = &clock;
+  environment.scheduler = &scheduler;
+  environment.offline = true;
+  core.connect(environment);
+  std::vector<Odometry> poses;
+  bus.topic("/odometry").tap(into(poses));
+  clock.set(Time(begin));
+  ASSERT_TRUE(core.configure());
+  ASSERT_TRUE(core.activate());
+  for (int i = 1; i <= 20; ++i) {
+    core.time_changed(clock.set(Time(begin + i * 70ms)));
+    scheduler.run_until_idle();
+  }
+  ASSERT_EQ(poses.size(), 140u);
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    EXPECT_EQ(to_time(poses[i].header.stamp) - to_time(poses[i - 1].header.stamp), 10ms) << i;
   }
   core.shutdown();
 }
