@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -90,7 +91,9 @@ Result<void> run(Arguments& arguments) {
     std::ifstream file(picture, std::ios::binary);
     std::ostringstream bytes;
     if (!file || !(bytes << file.rdbuf())) return Error{ErrorCode::io, picture + ": cannot read"};
-    report.pictures.push_back({std::filesystem::path(picture).stem().string(), bytes.str()});
+    std::string caption = std::filesystem::path(picture).stem().string();
+    std::replace(caption.begin(), caption.end(), '_', ' ');
+    report.pictures.push_back({std::move(caption), bytes.str()});
   }
   report.fusion = evaluated->fusion;
   return report_evaluations(*evaluated, report, arguments.run, arguments.out);

@@ -23,7 +23,7 @@ struct Options {
   double max_estimate_gap_s = 0.0;
   // Axial and lateral errors along this line (the tunnel's axis, the route; x, y): along it, and across. Empty: along
   // the truth's heading at each instant, which says little of errors that reach around the next bend.
-  std::vector<Eigen::Vector2d> centre_line;
+  std::vector<Eigen::Vector2d> centre_line = {};
   std::vector<double> lengths_m = {1, 5, 10, 20, 50, 100, 200, 300, 400, 500, 600, 700, 800};
 };
 

@@ -409,7 +409,7 @@ TEST(StateEstimatorComponent, HoldsThePositionByFixes) {
     if (0.1 * i > 14.0)
       pose.translation() = arc(14.0).translation() + 0.96 * (pose.translation() - arc(14.0).translation());
     message = odometry(to_time(message.header.stamp).time_since_epoch(), pose, "lidar");
-    set_covariance(message, {1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7});
+    set_covariance(message, {4e-4, 4e-4, 1e-5, 1e-7, 1e-7, 1e-7});
   };
   drive.fix = [&](sensor_msgs::msg::NavSatFix& fix, double t) {
     const Eigen::Vector3d p = arc(t).translation();
