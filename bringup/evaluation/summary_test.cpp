@@ -36,8 +36,10 @@ TEST(Summary, HasExactlyTheAgreedKeys) {
   };
   EXPECT_EQ(keys(j), (std::set<std::string>{"estimates", "distance_m", "duration_s"}));
   for (const char* name : {"lidar", "thermal"}) {
-    EXPECT_EQ(keys(j["estimates"][name]), (std::set<std::string>{"ate_m", "rpe_10m_percent", "drift_percent",
-                                                                 "yaw_end_deg", "scale", "availability", "frames"}));
+    EXPECT_EQ(keys(j["estimates"][name]),
+              (std::set<std::string>{"ate_m", "rpe_10m_percent", "drift_percent", "yaw_end_deg", "scale",
+                                     "availability", "frames", "axial_end_m", "lateral_end_m", "largest_gap_s", "nees",
+                                     "sigma3_coverage", "cpu_s", "error_end_m"}));
   }
   EXPECT_NEAR(j["distance_m"].get<double>(), 20.0, 1e-9);
   EXPECT_NEAR(j["duration_s"].get<double>(), 20.0, 1e-9);

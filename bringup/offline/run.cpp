@@ -1,5 +1,6 @@
 #include "bringup/offline/run.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +9,7 @@
 
 #include "bringup/offline/progress.hpp"
 #include "bringup/offline/scenario_description.hpp"
+#include "components/dataset/bag_writer.hpp"
 
 namespace adit::offline {
 namespace {
@@ -39,6 +41,39 @@ class Watched final : public OfflineSource {
  private:
   Source& source_;
   Progress progress_;
+};
+
+// What the components publish on some topics, as a bag: odometries of front ends for studies of the filter alone.
+class Recorder {
+ public:
+  Result<void> open(const std::string& folder, OfflineRunner& runner, const std::vector<std::string>& topics) {
+    auto writer = dataset::BagWriter::create(folder);
+    if (!writer) return writer.error();
+    writer_ = *std::move(writer);
+    for (const PortInfo& port : runner.ports()) {
+      const bool wanted = port.direction == PortInfo::Direction::output &&
+                          std::find(topics.begin(), topics.end(), port.topic) != topics.end();
+      if (!wanted) continue;
+      dataset::BagTopic topic;
+      topic.name = port.topic;
+      topic.type = port.type->ros_name;
+      topic.qos = dataset::bag_qos(10, false);
+      topic.type_hash = port.type->type_hash;
+      topic.schema = port.type->schema;
+      const Result<std::size_t> index = writer_->add_topic(topic);
+      if (!index) return index.error();
+      runner.tap_cdr(port.topic, [this, index = *index](Bytes cdr, Time stamp) {
+        if (!failed_) return;
+        failed_ = writer_->write({index, stamp.time_since_epoch().count(), cdr});
+      });
+    }
+    return {};
+  }
+  Result<void> close() { return !writer_ || !failed_ ? failed_ : writer_->close(); }
+
+ private:
+  std::unique_ptr<dataset::BagWriter> writer_;
+  Result<void> failed_;
 };
 
 Result<void> write_run(const RunOutcome& outcome) {
@@ -85,11 +120,19 @@ Result<RunOutcome> run(const RunRequest& request) {
   const Result<std::unique_ptr<Source>> source = open_source(request.input, options);
   if (!source) return source.error();
 
+  Recorder recorder;
+  if (!request.record.empty()) {
+    if (Result<void> opened = recorder.open(request.out + "/bag", **runner, request.record); !opened) {
+      return opened.error();
+    }
+  }
+
   RunOutcome outcome;
   const auto start = std::chrono::steady_clock::now();
   Watched watched(**source, std::filesystem::path(request.input).stem().string());
   const Result<OfflineStats> stats = (*runner)->run(watched);
   if (!stats) return stats.error();
+  if (Result<void> closed = recorder.close(); !closed) return closed.error();
   outcome.messages = *stats;
   outcome.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   outcome.simulated_s = std::chrono::duration<double>(stats->last - stats->first).count();

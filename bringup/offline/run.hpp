@@ -16,10 +16,11 @@ namespace adit::offline {
 
 struct RunRequest {
   std::string deployment;
-  DeploymentOverrides overrides;  // OUT and SCENARIO are set when they are not given
-  std::string input;              // scenario file, bag or folder: instead of the deployment's sources
-  std::string out;                // folder, made when it is not there
-  SourceOptions source;           // its topics are found by the run
+  DeploymentOverrides overrides;    // OUT and SCENARIO are set when they are not given
+  std::string input;                // scenario file, bag or folder: instead of the deployment's sources
+  std::string out;                  // folder, made when it is not there
+  SourceOptions source;             // its topics are found by the run
+  std::vector<std::string> record;  // topics that the components publish, for the bag OUT/bag
 };
 
 struct RunOutcome {

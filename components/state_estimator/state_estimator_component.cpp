@@ -81,6 +81,18 @@ class StateEstimatorComponent final : public Component {
   Param<double> lidar_anchor_period_{
       *this,        "lidar_anchor_period", 0.0,
       Unit::second, Range{0.0, 10.0},      "LiDAR poses are fused relative to one this old; 0: to the one before"};
+  Param<double> lidar_position_floor_{*this,
+                                      "lidar_position_floor",
+                                      0.01,
+                                      Unit::metre,
+                                      Range{1e-5, 10.0},
+                                      "deviation of one LiDAR pose below which no reported covariance is believed"};
+  Param<double> lidar_yaw_floor_{*this,        "lidar_yaw_floor", 2e-4,
+                                 Unit::radian, Range{1e-6, 1.0},  "the same of its heading"};
+  Param<double> thermal_position_floor_{*this,       "thermal_position_floor", 0.01,
+                                        Unit::metre, Range{1e-5, 10.0},        "the same of the thermal odometry"};
+  Param<double> thermal_yaw_floor_{*this,        "thermal_yaw_floor", 5e-4,
+                                   Unit::radian, Range{1e-6, 1.0},    "the same of its heading"};
   Param<Numbers> initial_pose_{*this, "initial_pose", Numbers{0, 0, 0}, "in odom_frame: x y [m], heading [rad]"};
   Param<double> initial_speed_{
       *this, "initial_speed", 0.0, Unit::metre_per_second, Range{-60.0, 60.0}, "when the first measurement comes"};
@@ -146,6 +158,10 @@ Result<void> StateEstimatorComponent::configure() {
     if (relative_poses_ != Switch::preset) o.odometry.relative_pose = relative_poses_ == Switch::on;
   }
   config_.odometries[0].odometry.anchor_period_s = lidar_anchor_period_;
+  config_.odometries[0].odometry.floor_position = lidar_position_floor_;
+  config_.odometries[0].odometry.floor_yaw = lidar_yaw_floor_;
+  config_.odometries[1].odometry.floor_position = thermal_position_floor_;
+  config_.odometries[1].odometry.floor_yaw = thermal_yaw_floor_;
   if (thermal_calibration_ != Switch::preset) {
     const bool on = thermal_calibration_ == Switch::on;
     config_.odometries[1].odometry.calibration = {.scale = on, .yaw_bias = on};
