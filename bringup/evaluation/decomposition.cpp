@@ -16,17 +16,21 @@ Decomposition decompose(const std::vector<Sample>& samples) {
   if (samples.size() < 2) return result;
   // Steps of the estimate, turned by minus the heading error in their middle, and those of the truth.
   std::vector<Eigen::Vector2d> with_yaw{Eigen::Vector2d::Zero()};
-  double product = 0.0, square = 0.0;
+  double true_way = 0.0,
+         way = 0.0;  // of the estimate: along the truth's direction, so that its noise does not lengthen it
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const Sample &a = samples[i - 1], &b = samples[i];
     const double error = a.start_yaw_error_rad + 0.5 * wrap_angle(b.start_yaw_error_rad - a.start_yaw_error_rad);
     const Eigen::Vector2d step = turned((b.start_aligned - a.start_aligned).head<2>(), -error);
     const Eigen::Vector2d truth = (b.truth.translation() - a.truth.translation()).head<2>();
-    product += step.dot(truth);
-    square += step.squaredNorm();
+    const double length = truth.norm();
+    if (length > 1e-6) {
+      true_way += length;
+      way += step.dot(truth) / length;
+    }
     with_yaw.push_back(with_yaw.back() + step);
   }
-  result.speed_scale = square > 0.0 ? product / square : 1.0;
+  result.speed_scale = way > 0.0 ? true_way / way : 1.0;
   const Eigen::Vector2d origin = samples.front().truth.translation().head<2>();
   ErrorParts sum;
   Eigen::Vector2d last_turned = Eigen::Vector2d::Zero();
