@@ -37,7 +37,7 @@ function(adit_test name)
     return()
   endif()
   if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 60)
+    set(ARG_TIMEOUT 300)  # only ends a test that hangs: seconds here, many times that on a loaded or emulated machine
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE adit_build ${ARG_LINKS} GTest::gmock_main)
