@@ -5,10 +5,12 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "components/geometry/se3.hpp"
 #include "components/tunnel_simulator/atmosphere.hpp"
+#include "components/tunnel_simulator/random.hpp"
 #include "components/tunnel_simulator/ray_caster.hpp"
 #include "idl/result.hpp"
 
@@ -69,12 +71,12 @@ class Lidar {
  private:
   struct Return {
     double range = 0.0;     // 0: none
-    double strength = 0.0;  // detection-limit units, before extinction
+    float strength = 0.0F;  // detection-limit units, before extinction
     float reflectivity = 0.0F;
   };
   struct Echo {
     Return part;
-    double share = 0.0;  // of the beam's power
+    float share = 0.0F;  // of the beam's power
   };
   static Return strongest(std::span<const Echo> echoes);
   Return shade(const RayCaster& caster, const RayPacket& packet, std::size_t lane, const Eigen::Vector3d& from,
@@ -82,15 +84,25 @@ class Lidar {
   void cast_columns(const RayCaster& caster, int first, int count);
   void resample_edges(const RayCaster& caster, int ring);
   void detect(const Atmosphere& atmosphere, int ring, std::uint64_t frame, LidarScan& scan) const;
-  Eigen::Vector3d beam(int ring, int column) const;
-  Eigen::Vector3d start(int ring, int column) const;
+  // The echo of smoke that is stronger than `echo`, or that echo attenuated; its one-way-and-back transmission.
+  std::pair<Return, double> through(const Atmosphere& atmosphere, const Return& echo, const RandomStream& random,
+                                    std::size_t index) const;
+  const Eigen::Vector3d& beam(std::size_t index) const { return beams_[index]; }
+  Eigen::Vector3d start(std::size_t index) const {
+    return {config_.beams.origin_radius * cos_[index], config_.beams.origin_radius * sin_[index], 0.0};
+  }
+  std::size_t index_of(int ring, int column) const {
+    return static_cast<std::size_t>(ring) * static_cast<std::size_t>(config_.beams.columns) +
+           static_cast<std::size_t>(column);
+  }
 
   LidarConfig config_;
   std::uint64_t seed_;
   std::vector<Pose> poses_;      // per column
-  std::vector<Return> returns_;  // organised
+  std::vector<Return> returns_;  // organised, as all below: [ring * columns + column]
   std::vector<Return> edged_;
-  std::vector<double> cos_, sin_;  // per ring and column of the azimuth: [ring * columns + column]
+  std::vector<Eigen::Vector3d> beams_;  // unit, sensor frame
+  std::vector<double> cos_, sin_;       // of the azimuth
 };
 
 }  // namespace adit::tunnel_simulator

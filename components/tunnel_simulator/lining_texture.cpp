@@ -1,6 +1,7 @@
 #include "components/tunnel_simulator/lining_texture.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "components/tunnel_simulator/equipment.hpp"
@@ -11,6 +12,13 @@ namespace adit::tunnel_simulator {
 namespace {
 
 constexpr float kMargin = 0.8F;
+
+// Binary logarithm of a positive normal number to 0.009: exponent, and a parabola through the mantissa.
+float log2_of(float x) {
+  const auto bits = std::bit_cast<std::uint32_t>(x);
+  const float t = std::bit_cast<float>((bits & 0x7fffffU) | 0x3f800000U) - 1.0F;
+  return static_cast<float>(static_cast<int>(bits >> 23) - 127) + t + 0.343F * t * (1.0F - t);
+}
 
 std::uint64_t key(const WorldDescription& world, const Chunk& chunk) {
   return mix(world.seed, 7000 + chunk.volume);
@@ -197,8 +205,9 @@ void paint_reflectivity(Canvas& canvas, const WorldDescription& world, const Chu
 LiningTexture::LiningTexture(const WorldDescription& world, const Chunk& chunk, bool thermal) {
   const VolumeDescription& v = world.volumes[chunk.volume];
   const bool open = v.kind == VolumeKind::open;
-  reflectivity_texel_ = open ? 0.25F : 0.05F;
-  Canvas factors(chunk, v.profile.perimeter(), reflectivity_texel_);
+  const double reflectivity_texel = open ? 0.25 : 0.05;
+  reflectivity_per_metre_ = static_cast<float>(1.0 / reflectivity_texel);
+  Canvas factors(chunk, v.profile.perimeter(), reflectivity_texel);
   paint_reflectivity(factors, world, chunk);
   reflectivity_width_ = factors.width();
   reflectivity_height_ = factors.height();
@@ -208,13 +217,13 @@ LiningTexture::LiningTexture(const WorldDescription& world, const Chunk& chunk, 
   }
   if (!thermal) return;
 
-  texel_ = open ? 0.1F : 0.025F;
+  const float texel = open ? 0.1F : 0.025F;
   Chunk padded = chunk;  // so that filtering near the chunk's border sees what lies beyond
   padded.begin -= kMargin;
   padded.end += kMargin;
-  Canvas kelvin(padded, v.profile.perimeter(), texel_);
+  Canvas kelvin(padded, v.profile.perimeter(), texel);
   paint_temperature(kelvin, world, padded);
-  levels_[0] = {kelvin.width(), kelvin.height(), 0};
+  levels_[0] = {kelvin.width(), kelvin.height(), 0, 1.0F / texel, 1.0F / texel};
   temperature_.reserve(kelvin.values().size() * 4);
   for (float k : kelvin.values()) {
     temperature_.push_back(static_cast<std::int16_t>(std::lround(std::clamp(1000.0F * k, -32000.0F, 32000.0F))));
@@ -230,7 +239,7 @@ void LiningTexture::build_levels() {
       const bool halve_s = ls > 0;
       const Level from = levels_[halve_s ? index(ls - 1, lu) : index(0, lu - 1)];
       Level to{halve_s ? (from.width + 1) / 2 : from.width, halve_s ? from.height : (from.height + 1) / 2,
-               temperature_.size()};
+               temperature_.size(), halve_s ? 0.5F * from.per_s : from.per_s, halve_s ? from.per_u : 0.5F * from.per_u};
       levels_[index(ls, lu)] = to;
       const auto at = [&](int x, int y) {
         return temperature_[from.offset +
@@ -264,24 +273,25 @@ float LiningTexture::sample(const Level& level, float x, float y) const {
   return top + ty * (bottom - top);
 }
 
-float LiningTexture::temperature(float s, float u, float footprint_s, float footprint_u) const {
+float LiningTexture::temperature(float s, float u, float footprint_s2, float footprint_u2) const {
   if (temperature_.empty()) return 0.0F;
-  const float wanted_s = std::clamp(std::log2(std::max(footprint_s / texel_, 1.0F)), 0.0F, kLevelsS - 1.001F);
-  const float wanted_u = std::clamp(std::log2(std::max(footprint_u / texel_, 1.0F)) + 0.5F, 0.0F, kLevelsU - 1.0F);
+  const float per_texel2 = levels_[0].per_s * levels_[0].per_s;
+  const float wanted_s = std::clamp(0.5F * log2_of(footprint_s2 * per_texel2), 0.0F, kLevelsS - 1.001F);
+  const float wanted_u = std::clamp(0.5F * log2_of(footprint_u2 * per_texel2) + 0.5F, 0.0F, kLevelsU - 1.0F);
   const int ls = static_cast<int>(wanted_s);
   const int lu = static_cast<int>(wanted_u);
   const float blend = wanted_s - static_cast<float>(ls);
-  const float y = u / (texel_ * static_cast<float>(1 << lu));
-  const float x = (s + kMargin) / (texel_ * static_cast<float>(1 << ls));
-  const std::size_t index = static_cast<std::size_t>(lu * kLevelsS + ls);
-  const float a = sample(levels_[index], x, y);
-  const float b = blend > 0.0F ? sample(levels_[index + 1], 0.5F * x, y) : a;
-  return 1e-3F * (a + blend * (b - a));
+  const Level& level = levels_[static_cast<std::size_t>(lu * kLevelsS + ls)];
+  const float x = (s + kMargin) * level.per_s;
+  const float y = u * level.per_u;
+  const float a = sample(level, x, y);
+  if (blend <= 0.0F) return 1e-3F * a;
+  return 1e-3F * (a + blend * (sample((&level)[1], 0.5F * x, y) - a));
 }
 
 float LiningTexture::reflectivity(float s, float u) const {
-  const int x = std::clamp(static_cast<int>(s / reflectivity_texel_), 0, reflectivity_width_ - 1);
-  const int y = std::clamp(static_cast<int>(u / reflectivity_texel_), 0, reflectivity_height_ - 1);
+  const int x = std::clamp(static_cast<int>(s * reflectivity_per_metre_), 0, reflectivity_width_ - 1);
+  const int y = std::clamp(static_cast<int>(u * reflectivity_per_metre_), 0, reflectivity_height_ - 1);
   return static_cast<float>(reflectivity_[static_cast<std::size_t>(y) * static_cast<std::size_t>(reflectivity_width_) +
                                           static_cast<std::size_t>(x)]) *
          (1.0F / 64.0F);

@@ -17,8 +17,9 @@ class LiningTexture {
   // Bakes the chunk. `thermal` off: reflectivity only.
   LiningTexture(const WorldDescription& world, const Chunk& chunk, bool thermal);
 
-  // Kelvin at (s, u) [m from the chunk's begin], averaged over a footprint of the given size [m]. No texture: 0.
-  float temperature(float s, float u, float footprint_s, float footprint_u) const;
+  // Kelvin at (s, u) [m from the chunk's begin], averaged over a footprint given by its squared sizes along s and u
+  // [m2]. No texture: 0.
+  float temperature(float s, float u, float footprint_s2, float footprint_u2) const;
   // Factor on the material's reflectivity.
   float reflectivity(float s, float u) const;
 
@@ -28,15 +29,15 @@ class LiningTexture {
   struct Level {
     int width = 0, height = 0;  // texels along s and u
     std::size_t offset = 0;
+    float per_s = 0.0F, per_u = 0.0F;  // texels a metre
   };
   float sample(const Level& level, float x, float y) const;
   void build_levels();
 
-  float texel_ = 0.025F;
   std::array<Level, static_cast<std::size_t>(kLevelsS) * kLevelsU> levels_{};
   std::vector<std::int16_t> temperature_;
   int reflectivity_width_ = 0, reflectivity_height_ = 0;
-  float reflectivity_texel_ = 0.05F;
+  float reflectivity_per_metre_ = 20.0F;
   std::vector<std::uint8_t> reflectivity_;
 };
 

@@ -3,6 +3,7 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -20,18 +21,39 @@ static_assert(offsetof(RayPacket, object) == offsetof(RTCRayHit16, hit.instID));
 
 constexpr double kGrid = 8.0;  // places are rounded to this, so that small motions change nothing
 
+// All that shading needs of a triangle, in one cache line.
+struct alignas(64) Facet {
+  double nx, ny, nz, offset;       // unit normal n and n . p of its plane, object frame
+  float s, s_v, s_w, u, u_v, u_w;  // lining coordinates are affine in the hit's barycentric (v, w)
+  std::uint32_t surface, unused = 0;
+};
+static_assert(sizeof(Facet) == 64);
+
+Facet facet_of(const Mesh& mesh, const MeshTriangle& t) {
+  const MeshVertex& a = mesh.vertices[t.a];
+  const MeshVertex& b = mesh.vertices[t.b];
+  const MeshVertex& c = mesh.vertices[t.c];
+  Eigen::Vector3d n = (b.position - a.position).cross(c.position - a.position);
+  n = n.squaredNorm() > 0.0 ? Eigen::Vector3d(n.normalized()) : Eigen::Vector3d::UnitZ();  // no ray hits an area of 0
+  return {n.x(), n.y(), n.z(), n.dot(a.position), a.s, b.s - a.s, c.s - a.s, a.u, b.u - a.u, c.u - a.u, t.surface};
+}
+
 // A mesh in Embree with what shading needs.
 struct Solid {
-  Mesh mesh;
+  std::vector<Facet> facets;
+  std::vector<Surface> surfaces;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3f axis = Eigen::Vector3f::UnitX();
   Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  // world <- object
   std::size_t chunk = 0;
   RTCScene scene = nullptr;
-  mutable std::once_flag baked;
+  mutable std::mutex baking;
+  mutable std::atomic<bool> baked{false};
   mutable LiningTexture texture;
 
-  Solid(RTCDevice device, Mesh m) : mesh(std::move(m)) {
+  Solid(RTCDevice device, Mesh mesh) : surfaces(std::move(mesh.surfaces)) {
+    facets.reserve(mesh.triangles.size());
+    for (const MeshTriangle& t : mesh.triangles) facets.push_back(facet_of(mesh, t));
     scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -51,6 +73,17 @@ struct Solid {
     rtcAttachGeometry(scene, geometry);
     rtcReleaseGeometry(geometry);
     rtcCommitScene(scene);
+  }
+  // Of the lining; baked when it is first seen.
+  const LiningTexture& lining(const World& world, bool thermal) const {
+    if (!baked.load(std::memory_order_acquire)) {
+      const std::lock_guard lock(baking);
+      if (!baked.load(std::memory_order_relaxed)) {
+        texture = LiningTexture(world.description(), world.chunks()[chunk], thermal);
+        baked.store(true, std::memory_order_release);
+      }
+    }
+    return texture;
   }
   ~Solid() { rtcReleaseScene(scene); }
   Solid(const Solid&) = delete;
@@ -146,7 +179,7 @@ void RayCaster::look_from(const Eigen::Vector3d& place) {
   d.slots.clear();
   for (std::size_t i = 0; i < chunks.size(); ++i) {
     if (!d.cache[i] || chunks[i].bounds.exteriorDistance(rounded) > d.config.radius) continue;
-    if (d.cache[i]->mesh.triangles.empty()) continue;
+    if (d.cache[i]->facets.empty()) continue;
     d.attach(*d.cache[i], static_cast<unsigned>(d.slots.size()), 1);
     d.slots.push_back(d.cache[i].get());
   }
@@ -188,40 +221,40 @@ void RayCaster::cast(RayPacket& packet) const {
   rtcIntersect16(valid.data(), impl_->top, &context, reinterpret_cast<RTCRayHit16*>(&packet));
 }
 
+void RayCaster::prefetch(const RayPacket& packet) const {
+  for (std::size_t lane = 0; lane < kPacket; ++lane) {
+    if (packet.hit(lane)) __builtin_prefetch(&impl_->slots[packet.object[lane]]->facets[packet.triangle[lane]]);
+  }
+}
+
 double RayCaster::exact_range(const RayPacket& packet, std::size_t lane, const Eigen::Vector3d& from,
                               const Eigen::Vector3d& direction) const {
   if (is_mover(packet, lane)) return packet.far[lane];
   const Solid& solid = *impl_->slots[packet.object[lane]];
-  const MeshTriangle& t = solid.mesh.triangles[packet.triangle[lane]];
-  const Eigen::Vector3d& a = solid.mesh.vertices[t.a].position;
-  const Eigen::Vector3d normal = (solid.mesh.vertices[t.b].position - a).cross(solid.mesh.vertices[t.c].position - a);
-  const double along = normal.dot(direction);
-  const double range = normal.dot(a + solid.centre - from) / along;
+  const Facet& f = solid.facets[packet.triangle[lane]];
+  const double along = f.nx * direction.x() + f.ny * direction.y() + f.nz * direction.z();
+  const double above = f.nx * (from.x() - solid.centre.x()) + f.ny * (from.y() - solid.centre.y()) +
+                       f.nz * (from.z() - solid.centre.z());
+  const double range = (f.offset - above) / along;
   // A sliver seen edge-on has no usable plane: keep what the traversal found.
   return std::abs(range - packet.far[lane]) < 0.01 ? range : packet.far[lane];
 }
 
 SurfaceHit RayCaster::surface(const RayPacket& packet, std::size_t lane) const {
   const Solid& solid = *impl_->slots[packet.object[lane]];
-  const MeshTriangle& t = solid.mesh.triangles[packet.triangle[lane]];
+  const Facet& f = solid.facets[packet.triangle[lane]];
   SurfaceHit hit;
-  hit.surface = &solid.mesh.surfaces[t.surface];
-  hit.normal = (solid.turn * Eigen::Vector3f(packet.nx[lane], packet.ny[lane], packet.nz[lane])).normalized();
+  hit.surface = &solid.surfaces[f.surface];
+  hit.normal = Eigen::Vector3f(static_cast<float>(f.nx), static_cast<float>(f.ny), static_cast<float>(f.nz));
+  if (is_mover(packet, lane)) hit.normal = solid.turn * hit.normal;
   hit.axis = solid.axis;
-  hit.key = packet.object[lane] * 65536U + t.surface;
+  hit.key = packet.object[lane] * 65536U + f.surface;
   if (!hit.surface->lining) return hit;
-  const MeshVertex& a = solid.mesh.vertices[t.a];
-  const MeshVertex& b = solid.mesh.vertices[t.b];
-  const MeshVertex& c = solid.mesh.vertices[t.c];
   const float v = packet.u[lane];
   const float w = packet.v[lane];
-  hit.s = a.s + v * (b.s - a.s) + w * (c.s - a.s);
-  hit.u = a.u + v * (b.u - a.u) + w * (c.u - a.u);
-  std::call_once(solid.baked, [&] {
-    solid.texture =
-        LiningTexture(impl_->world.description(), impl_->world.chunks()[solid.chunk], impl_->config.thermal);
-  });
-  hit.texture = &solid.texture;
+  hit.s = f.s + v * f.s_v + w * f.s_w;
+  hit.u = f.u + v * f.u_v + w * f.u_w;
+  hit.texture = &solid.lining(impl_->world, impl_->config.thermal);
   return hit;
 }
 
@@ -231,7 +264,7 @@ bool RayCaster::is_mover(const RayPacket& packet, std::size_t lane) const {
 
 std::size_t RayCaster::triangle_count() const {
   std::size_t sum = 0;
-  for (const Solid* s : impl_->slots) sum += s->mesh.triangles.size();
+  for (const Solid* s : impl_->slots) sum += s->facets.size();
   return sum;
 }
 

@@ -64,6 +64,8 @@ class RayCaster {
 
   // Thread-safe. All lanes are cast; fill unused ones with far = -1.
   void cast(RayPacket& packet) const;
+  // Has the memory fetched that exact_range() and surface() will need, all lanes at once.
+  void prefetch(const RayPacket& packet) const;
   // Range along a double-precision ray (world coordinates) to the plane of the triangle a lane hit: removes the float
   // rounding of the traversal. Moving objects: the float range.
   double exact_range(const RayPacket& packet, std::size_t lane, const Eigen::Vector3d& from,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "components/tunnel_simulator/noise.hpp"
+#include "components/tunnel_simulator/normal_table.hpp"
 #include "components/tunnel_simulator/parallel.hpp"
 #include "components/tunnel_simulator/random.hpp"
 
@@ -15,6 +16,20 @@ constexpr int kTile = 4;
 constexpr float kTableBegin = -60.0F;
 constexpr float kTableEnd = 200.0F;
 constexpr float kTableStep = 0.25F;
+
+// Ages of the samples of an exponential trail [time constants]: the medians of `taps` equally likely parts.
+constexpr int kMostTaps = 10;
+struct TrailAges {
+  std::array<std::array<float, kMostTaps>, kMostTaps + 1> of{};
+  TrailAges() {
+    for (std::size_t taps = 1; taps <= kMostTaps; ++taps) {
+      for (std::size_t k = 0; k < taps; ++k) {
+        of[taps][k] = -std::log1p(-(static_cast<float>(k) + 0.5F) / static_cast<float>(taps));
+      }
+    }
+  }
+};
+const TrailAges kAges;
 
 // Midpoint rule over the band; Planck's law with h, c, k of the 2019 SI.
 double band_radiance(double kelvin) {
@@ -50,12 +65,25 @@ float BandRadiance::slope_at(float celsius) const {
 ThermalCamera::ThermalCamera(ThermalConfig config, std::uint64_t seed) : config_(std::move(config)), seed_(seed) {
   const CameraModel& m = config_.camera;
   const auto size = static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height);
-  rays_.reserve(size);
+  const int tiles_across = (m.width + kTile - 1) / kTile;
+  tiles_.resize(static_cast<std::size_t>(tiles_across * ((m.height + kTile - 1) / kTile)));
+  for (std::vector<float>* plane : {&plane_x_, &plane_y_, &ray_z_, &radiance_, &range_}) plane->resize(size);
+  key_.resize(size);
   for (int y = 0; y < m.height; ++y) {
-    for (int x = 0; x < m.width; ++x) rays_.emplace_back(m.ray({x, y}).cast<float>());
+    for (int x = 0; x < m.width; ++x) {
+      const Eigen::Vector3f ray = m.ray({x, y}).cast<float>();
+      const std::size_t i = row_begin(y) + static_cast<std::size_t>(x);
+      plane_x_[i] = ray.x() / ray.z();
+      plane_y_[i] = ray.y() / ray.z();
+      ray_z_[i] = ray.z();
+      TileRays& tile = tiles_[static_cast<std::size_t>(y / kTile * tiles_across + x / kTile)];
+      const auto lane = static_cast<std::size_t>(y % kTile * kTile + x % kTile);
+      tile.x[lane] = ray.x();
+      tile.y[lane] = ray.y();
+      tile.z[lane] = ray.z();
+    }
   }
   poses_.resize(static_cast<std::size_t>(m.height));
-  pixels_.resize(size);
   radiance_image_.resize(size);
   work_.resize(size);
   pattern_.resize(size);
@@ -72,9 +100,10 @@ ThermalCamera::ThermalCamera(ThermalConfig config, std::uint64_t seed) : config_
 }
 
 ThermalCamera::Pixel ThermalCamera::shade(const RayCaster& caster, const Atmosphere& atmosphere,
-                                          const RayPacket& packet, std::size_t lane, const Eigen::Vector3d& from,
-                                          const Eigen::Vector3f& direction) const {
+                                          const RayPacket& packet, std::size_t lane,
+                                          const Eigen::Vector3d& from) const {
   Pixel out;
+  const Eigen::Vector3f direction(packet.dx[lane], packet.dy[lane], packet.dz[lane]);
   if (!packet.hit(lane)) {
     out.radiance = direction.z() > 0.03F ? sky_radiance_ : wall_radiance_;
   } else {
@@ -84,14 +113,17 @@ ThermalCamera::Pixel ThermalCamera::shade(const RayCaster& caster, const Atmosph
     float kelvin = hit.surface->temperature;
     if (hit.texture != nullptr) {
       out.key = 1U + static_cast<std::uint32_t>(hit.surface->material);  // one lining through all chunks
-      const float cosine = std::max(0.02F, std::abs(hit.normal.dot(direction)));
-      const Eigen::Vector3f along = direction - direction.dot(hit.normal) * hit.normal;
-      const float share =
-          along.squaredNorm() > 1e-6F ? std::pow(along.dot(hit.axis), 2.0F) / along.squaredNorm() : 0.0F;
-      const float stretch = 1.0F / (cosine * cosine) - 1.0F;
+      // The pixel's footprint is stretched along the direction in which the wall is seen at a slant.
+      const float slant = direction.dot(hit.normal);
+      const float cosine2 = std::max(0.0004F, slant * slant);
+      const float across2 = 1.0F - std::min(1.0F, slant * slant);
+      const float along = direction.dot(hit.axis) - slant * hit.normal.dot(hit.axis);
+      const float share = across2 > 1e-6F ? std::min(1.0F, along * along / across2) : 0.0F;
+      const float stretch = 1.0F / cosine2 - 1.0F;
       const float footprint = out.range / static_cast<float>(config_.camera.fx);
-      kelvin += hit.texture->temperature(hit.s, hit.u, footprint * std::sqrt(1.0F + stretch * share),
-                                         footprint * std::sqrt(1.0F + stretch * (1.0F - share)));
+      const float area = footprint * footprint;
+      kelvin += hit.texture->temperature(hit.s, hit.u, area * (1.0F + stretch * share),
+                                         area * (1.0F + stretch * (1.0F - share)));
     }
     const float emissivity = properties(hit.surface->material).emissivity;
     out.radiance = emissivity * band_.at(wall_celsius_ + kelvin) + (1.0F - emissivity) * air_radiance_;
@@ -107,40 +139,49 @@ ThermalCamera::Pixel ThermalCamera::shade(const RayCaster& caster, const Atmosph
 void ThermalCamera::render_tile_row(const RayCaster& caster, const Atmosphere& atmosphere, int tile_row) {
   const CameraModel& m = config_.camera;
   RayPacket packet;
-  std::array<Eigen::Vector3f, kPacket> direction;
   packet.time.fill(0.5F);
-  std::array<Eigen::Matrix3f, kTile> turn;
-  std::array<Eigen::Vector3f, kTile> from;
-  for (int i = 0; i < kTile; ++i) {
-    const Pose& pose = poses_[static_cast<std::size_t>(std::min(m.height - 1, tile_row * kTile + i))];
-    turn[static_cast<std::size_t>(i)] = pose.linear().cast<float>();
-    from[static_cast<std::size_t>(i)] = (pose.translation() - caster.origin()).cast<float>();
+  std::array<RayPacket::F, 9> turn;  // world <- camera of each lane's row, by columns
+  for (std::size_t lane = 0; lane < kPacket; ++lane) {
+    const int y = std::min(m.height - 1, tile_row * kTile + static_cast<int>(lane) / kTile);
+    const Pose& pose = poses_[static_cast<std::size_t>(y)];
+    for (std::size_t k = 0; k < 9; ++k) {
+      turn[k][lane] =
+          static_cast<float>(pose.linear()(static_cast<Eigen::Index>(k % 3), static_cast<Eigen::Index>(k / 3)));
+    }
+    const Eigen::Vector3f from = (pose.translation() - caster.origin()).cast<float>();
+    packet.ox[lane] = from.x();
+    packet.oy[lane] = from.y();
+    packet.oz[lane] = from.z();
   }
-  for (int x0 = 0; x0 < m.width; x0 += kTile) {
+  const int tiles_across = (m.width + kTile - 1) / kTile;
+  for (int t = 0; t < tiles_across; ++t) {
+    const TileRays& rays = tiles_[static_cast<std::size_t>(tile_row * tiles_across + t)];
     for (std::size_t lane = 0; lane < kPacket; ++lane) {
-      const std::size_t row = lane / kTile;
-      const int y = tile_row * kTile + static_cast<int>(row);
-      const int x = x0 + static_cast<int>(lane % kTile);
-      if (x >= m.width || y >= m.height) {
-        packet.far[lane] = -1.0F;
-        continue;
-      }
-      direction[lane] = turn[row] * rays_[static_cast<std::size_t>(y * m.width + x)];
-      packet.ox[lane] = from[row].x();
-      packet.oy[lane] = from[row].y();
-      packet.oz[lane] = from[row].z();
-      packet.dx[lane] = direction[lane].x();
-      packet.dy[lane] = direction[lane].y();
-      packet.dz[lane] = direction[lane].z();
+      const float x = rays.x[lane], y = rays.y[lane], z = rays.z[lane];
+      packet.dx[lane] = turn[0][lane] * x + turn[3][lane] * y + turn[6][lane] * z;
+      packet.dy[lane] = turn[1][lane] * x + turn[4][lane] * y + turn[7][lane] * z;
+      packet.dz[lane] = turn[2][lane] * x + turn[5][lane] * y + turn[8][lane] * z;
       packet.far[lane] = 1e4F;
     }
+    const int columns = std::min(kTile, m.width - t * kTile);
+    const int rows = std::min(kTile, m.height - tile_row * kTile);
+    if (columns < kTile || rows < kTile) {
+      for (int lane = 0; lane < static_cast<int>(kPacket); ++lane) {
+        if (lane % kTile >= columns || lane / kTile >= rows) packet.far[static_cast<std::size_t>(lane)] = -1.0F;
+      }
+    }
     caster.cast(packet);
-    for (std::size_t lane = 0; lane < kPacket; ++lane) {
-      const int y = tile_row * kTile + static_cast<int>(lane / kTile);
-      const int x = x0 + static_cast<int>(lane % kTile);
-      if (x >= m.width || y >= m.height) continue;
-      pixels_[static_cast<std::size_t>(y * m.width + x)] =
-          shade(caster, atmosphere, packet, lane, poses_[static_cast<std::size_t>(y)].translation(), direction[lane]);
+    caster.prefetch(packet);
+    for (int r = 0; r < rows; ++r) {
+      const int y = tile_row * kTile + r;
+      for (int c = 0; c < columns; ++c) {
+        const Pixel pixel = shade(caster, atmosphere, packet, static_cast<std::size_t>(r * kTile + c),
+                                  poses_[static_cast<std::size_t>(y)].translation());
+        const std::size_t i = row_begin(y) + static_cast<std::size_t>(t * kTile + c);
+        radiance_[i] = pixel.radiance;
+        range_[i] = pixel.range;
+        key_[i] = pixel.key;
+      }
     }
   }
 }
@@ -148,51 +189,50 @@ void ThermalCamera::render_tile_row(const RayCaster& caster, const Atmosphere& a
 // Pixels where the thing seen changes are averaged over four sub-rays, into radiance_image_.
 void ThermalCamera::resample_edges(const RayCaster& caster, const Atmosphere& atmosphere, int row) {
   const CameraModel& m = config_.camera;
-  const Pixel* here = pixels_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(m.width);
-  float* out = radiance_image_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(m.width);
+  const std::uint32_t* key = key_.data() + row_begin(row);
+  float* out = radiance_image_.data() + row_begin(row);
   const Pose& pose = poses_[static_cast<std::size_t>(row)];
   const Eigen::Vector3f from = (pose.translation() - caster.origin()).cast<float>();
   const Eigen::Matrix3f turn = pose.linear().cast<float>();
   const float offset = 0.25F / static_cast<float>(m.fx);
   std::array<int, 4> pending{};
   std::size_t waiting = 0;
+  RayPacket packet;
+  packet.time.fill(0.5F);
+  packet.ox.fill(from.x());
+  packet.oy.fill(from.y());
+  packet.oz.fill(from.z());
   const auto flush = [&] {
-    RayPacket packet;
-    std::array<Eigen::Vector3f, kPacket> direction;
-    packet.time.fill(0.5F);
     for (std::size_t lane = 0; lane < kPacket; ++lane) {
-      if (lane / 4 >= waiting) {
-        packet.far[lane] = -1.0F;
-        continue;
-      }
-      Eigen::Vector3f ray = rays_[static_cast<std::size_t>(row * m.width + pending[lane / 4])];
-      ray.x() += (lane % 2 == 0 ? -offset : offset) * ray.z();
-      ray.y() += (lane % 4 < 2 ? -offset : offset) * ray.z();
-      direction[lane] = turn * ray.normalized();
-      packet.ox[lane] = from.x();
-      packet.oy[lane] = from.y();
-      packet.oz[lane] = from.z();
-      packet.dx[lane] = direction[lane].x();
-      packet.dy[lane] = direction[lane].y();
-      packet.dz[lane] = direction[lane].z();
-      packet.far[lane] = 1e4F;
+      packet.far[lane] = lane / 4 < waiting ? 1e4F : -1.0F;
+      if (lane / 4 >= waiting) continue;
+      const std::size_t i = row_begin(row) + static_cast<std::size_t>(pending[lane / 4]);
+      const Eigen::Vector3f ray(plane_x_[i] + (lane % 2 == 0 ? -offset : offset),
+                                plane_y_[i] + (lane % 4 < 2 ? -offset : offset), 1.0F);
+      const Eigen::Vector3f direction = turn * ray.normalized();
+      packet.dx[lane] = direction.x();
+      packet.dy[lane] = direction.y();
+      packet.dz[lane] = direction.z();
     }
     caster.cast(packet);
+    caster.prefetch(packet);
     for (std::size_t k = 0; k < waiting; ++k) {
       float sum = 0.0F;
       for (std::size_t lane = 4 * k; lane < 4 * k + 4; ++lane) {
-        sum += shade(caster, atmosphere, packet, lane, pose.translation(), direction[lane]).radiance;
+        sum += shade(caster, atmosphere, packet, lane, pose.translation()).radiance;
       }
       out[pending[k]] = 0.25F * sum;
     }
     waiting = 0;
   };
+  std::copy_n(radiance_.data() + row_begin(row), m.width, out);
+  if (!config_.edges) return;
+  const std::uint32_t* above = row > 0 ? key - m.width : key;
+  const std::uint32_t* below = row + 1 < m.height ? key + m.width : key;
   for (int x = 0; x < m.width; ++x) {
-    out[x] = here[x].radiance;
-    const bool edge = config_.edges && ((x > 0 && here[x - 1].key != here[x].key) ||
-                                        (x + 1 < m.width && here[x + 1].key != here[x].key) ||
-                                        (row > 0 && here[x - m.width].key != here[x].key) ||
-                                        (row + 1 < m.height && here[x + m.width].key != here[x].key));
+    const std::uint32_t here = key[x];
+    const bool edge = key[std::max(0, x - 1)] != here || key[std::min(m.width - 1, x + 1)] != here ||
+                      above[x] != here || below[x] != here;
     if (!edge) continue;
     pending[waiting++] = x;
     if (waiting == pending.size()) flush();
@@ -205,38 +245,52 @@ void ThermalCamera::lag(int row, const Vector6d& twist) {
   const CameraModel& m = config_.camera;
   const Eigen::Vector3f v = twist.head<3>().cast<float>();
   const Eigen::Vector3f w = twist.tail<3>().cast<float>();
-  const auto fx = static_cast<float>(m.fx);
-  const auto fy = static_cast<float>(m.fy);
-  const auto tau = static_cast<float>(config_.time_constant);
-  for (int x = 0; x < m.width; ++x) {
-    const auto i = static_cast<std::size_t>(row * m.width + x);
-    const Eigen::Vector3f& ray = rays_[i];
-    const float range = pixels_[i].range > 0.0F ? pixels_[i].range : 1e4F;
-    const Eigen::Vector3f p = ray * range;
-    const Eigen::Vector3f dp = -v - w.cross(p);
-    const float trail_x = tau * fx * (dp.x() - ray.x() / ray.z() * dp.z()) / p.z();
-    const float trail_y = tau * fy * (dp.y() - ray.y() / ray.z() * dp.z()) / p.z();
-    const float length = std::min(60.0F, std::hypot(trail_x, trail_y));
-    if (length < 0.25F) {
-      work_[i] = radiance_image_[i];
-      continue;
+  const auto scale_x = static_cast<float>(config_.time_constant * m.fx);
+  const auto scale_y = static_cast<float>(config_.time_constant * m.fy);
+  const auto last_x = static_cast<float>(m.width) - 1.001F;
+  const auto last_y = static_cast<float>(m.height) - 1.001F;
+  constexpr int kBlock = 64;
+  std::array<float, kBlock> trail_x, trail_y;
+  for (int begin = 0; begin < m.width; begin += kBlock) {
+    const int count = std::min(kBlock, m.width - begin);
+    const std::size_t first = row_begin(row) + static_cast<std::size_t>(begin);
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k);
+      const float x = plane_x_[i], y = plane_y_[i];
+      const float depth = ray_z_[i] * (range_[i] > 0.0F ? range_[i] : 1e4F);
+      const float near = 1.0F / depth;
+      // Velocity of the point (x, y, 1) * depth in the camera's frame, over depth.
+      const float ax = -v.x() * near - (w.y() - w.z() * y);
+      const float ay = -v.y() * near - (w.z() * x - w.x());
+      const float az = -v.z() * near - (w.x() * y - w.y() * x);
+      trail_x[static_cast<std::size_t>(k)] = scale_x * (ax - x * az);
+      trail_y[static_cast<std::size_t>(k)] = scale_y * (ay - y * az);
     }
-    const int taps = std::clamp(static_cast<int>(std::ceil(1.5F * length)), 2, 10);
-    float sum = 0.0F;
-    for (int k = 0; k < taps; ++k) {
-      const float age = -std::log1p(-(static_cast<float>(k) + 0.5F) / static_cast<float>(taps));
-      const float px = std::clamp(static_cast<float>(x) + age * trail_x, 0.0F, static_cast<float>(m.width) - 1.001F);
-      const float py = std::clamp(static_cast<float>(row) + age * trail_y, 0.0F, static_cast<float>(m.height) - 1.001F);
-      const int ix = static_cast<int>(px);
-      const int iy = static_cast<int>(py);
-      const float tx = px - static_cast<float>(ix);
-      const float ty = py - static_cast<float>(iy);
-      const float* a = radiance_image_.data() + iy * m.width + ix;
-      const float top = a[0] + tx * (a[1] - a[0]);
-      const float bottom = a[m.width] + tx * (a[m.width + 1] - a[m.width]);
-      sum += top + ty * (bottom - top);
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k);
+      const float tx = trail_x[static_cast<std::size_t>(k)], ty = trail_y[static_cast<std::size_t>(k)];
+      const float length = std::min(60.0F, std::sqrt(tx * tx + ty * ty));
+      if (length < 0.25F) {
+        work_[i] = radiance_image_[i];
+        continue;
+      }
+      const int taps = std::clamp(static_cast<int>(1.5F * length) + 1, 2, kMostTaps);
+      float sum = 0.0F;
+      for (int n = 0; n < taps; ++n) {
+        const float age = kAges.of[static_cast<std::size_t>(taps)][static_cast<std::size_t>(n)];
+        const float px = std::clamp(static_cast<float>(begin + k) + age * tx, 0.0F, last_x);
+        const float py = std::clamp(static_cast<float>(row) + age * ty, 0.0F, last_y);
+        const int ix = static_cast<int>(px);
+        const int iy = static_cast<int>(py);
+        const float fx = px - static_cast<float>(ix);
+        const float fy = py - static_cast<float>(iy);
+        const float* a = radiance_image_.data() + iy * m.width + ix;
+        const float top = a[0] + fx * (a[1] - a[0]);
+        const float bottom = a[m.width] + fx * (a[m.width + 1] - a[m.width]);
+        sum += top + fy * (bottom - top);
+      }
+      work_[i] = sum / static_cast<float>(taps);
     }
-    work_[i] = sum / static_cast<float>(taps);
   }
 }
 
@@ -244,22 +298,28 @@ void ThermalCamera::lag(int row, const Vector6d& twist) {
 void ThermalCamera::optics(int threads) {
   const CameraModel& m = config_.camera;
   const int half = static_cast<int>(kernel_.size()) / 2;
-  const auto pass = [&](const std::vector<float>& in, std::vector<float>& out, int step_x, int step_y) {
-    parallel_for(threads, static_cast<std::size_t>(m.height), [&](std::size_t r) {
-      const int y = static_cast<int>(r);
-      for (int x = 0; x < m.width; ++x) {
-        float sum = 0.0F;
-        for (int k = -half; k <= half; ++k) {
-          const int px = std::clamp(x + k * step_x, 0, m.width - 1);
-          const int py = std::clamp(y + k * step_y, 0, m.height - 1);
-          sum += kernel_[static_cast<std::size_t>(k + half)] * in[static_cast<std::size_t>(py * m.width + px)];
-        }
-        out[static_cast<std::size_t>(y * m.width + x)] = sum;
-      }
-    });
-  };
-  pass(work_, radiance_image_, 1, 0);
-  pass(radiance_image_, work_, 0, 1);
+  parallel_for(threads, static_cast<std::size_t>(m.height), [&](std::size_t r) {
+    const float* in = work_.data() + row_begin(static_cast<int>(r));
+    float* out = radiance_image_.data() + row_begin(static_cast<int>(r));
+    std::fill_n(out, m.width, 0.0F);
+    for (int k = -half; k <= half; ++k) {
+      const float weight = kernel_[static_cast<std::size_t>(k + half)];
+      const int inner_begin = std::clamp(-k, 0, m.width);
+      const int inner_end = std::clamp(m.width - k, inner_begin, m.width);
+      for (int x = 0; x < inner_begin; ++x) out[x] += weight * in[0];
+      for (int x = inner_begin; x < inner_end; ++x) out[x] += weight * in[x + k];
+      for (int x = inner_end; x < m.width; ++x) out[x] += weight * in[m.width - 1];
+    }
+  });
+  parallel_for(threads, static_cast<std::size_t>(m.height), [&](std::size_t r) {
+    float* out = work_.data() + row_begin(static_cast<int>(r));
+    std::fill_n(out, m.width, 0.0F);
+    for (int k = -half; k <= half; ++k) {
+      const float weight = kernel_[static_cast<std::size_t>(k + half)];
+      const float* in = radiance_image_.data() + row_begin(std::clamp(static_cast<int>(r) + k, 0, m.height - 1));
+      for (int x = 0; x < m.width; ++x) out[x] += weight * in[x];
+    }
+  });
 }
 
 // The pattern of one epoch between two shutter corrections: white, column and a smooth bowl, unit variance together.
@@ -296,18 +356,24 @@ void ThermalCamera::digitize(int row, double time, std::uint64_t frame, ThermalI
       1.0F + 0.002F * value_noise(static_cast<float>(time / 90.0), 0.5F, static_cast<std::uint32_t>(mix(seed_, 205)));
   const auto columns = static_cast<float>(config_.column_noise) * cpk;
   const auto netd = static_cast<float>(config_.netd) * cpk;
-  const std::size_t base = static_cast<std::size_t>(row) * static_cast<std::size_t>(m.width);
-  for (int x = 0; x < m.width; x += 2) {
-    const auto [n0, n1] = random.normal_pair(base + static_cast<std::size_t>(x));
-    for (int k = 0; k < 2 && x + k < m.width; ++k) {
-      const std::size_t i = base + static_cast<std::size_t>(x + k);
-      float value = gain * (work_[i] - wall_radiance_);
-      if (config_.noise) {
-        value = response * value + netd * (k == 0 ? n0 : n1) + columns * columns_[static_cast<std::size_t>(x + k)] +
-                pattern * pattern_[i] + drift;
-      }
-      value += static_cast<float>(config_.counts_at_wall);
-      image.counts[i] = static_cast<std::uint16_t>(std::lround(std::clamp(value, 0.0F, 16383.0F)));
+  const auto middle = static_cast<float>(config_.counts_at_wall);
+  const std::size_t base = row_begin(row);
+  const auto count = [](float value) { return static_cast<std::uint16_t>(std::clamp(value, 0.0F, 16383.0F) + 0.5F); };
+  if (!config_.noise) {
+    for (std::size_t i = base; i < base + static_cast<std::size_t>(m.width); ++i) {
+      image.counts[i] = count(gain * (work_[i] - wall_radiance_) + middle);
+    }
+    return;
+  }
+  const NormalTable& normal = NormalTable::instance();
+  for (int x = 0; x < m.width; x += 4) {
+    const std::array<float, 4> white = normal.four(random.bits(base + static_cast<std::size_t>(x)));
+    for (int k = 0; k < std::min(4, m.width - x); ++k) {
+      const auto column = static_cast<std::size_t>(x + k);
+      const std::size_t i = base + column;
+      const float value = response * gain * (work_[i] - wall_radiance_) + netd * white[static_cast<std::size_t>(k)] +
+                          columns * columns_[column] + pattern * pattern_[i] + drift;
+      image.counts[i] = count(value + middle);
     }
   }
 }
@@ -331,7 +397,7 @@ void ThermalCamera::capture(const RayCaster& caster, const Atmosphere& atmospher
   sky_radiance_ = band_.at(static_cast<float>(celsius.sky));
   image.width = m.width;
   image.height = m.height;
-  image.counts.resize(pixels_.size());
+  image.counts.resize(key_.size());
   update_pattern(time, threads);
   const RandomStream random(seed_, 206, frame);
   for (std::size_t x = 0; x < columns_.size(); ++x) columns_[x] = random.normal_pair(x).first;

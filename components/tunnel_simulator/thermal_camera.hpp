@@ -75,22 +75,30 @@ class ThermalCamera {
     float range = 0.0F;     // 0: nothing hit
     std::uint32_t key = 0;  // of the thing hit: different keys, different things
   };
+  struct TileRays {  // of 4 x 4 pixels, camera frame
+    RayPacket::F x, y, z;
+  };
   void render_tile_row(const RayCaster& caster, const Atmosphere& atmosphere, int tile_row);
   void resample_edges(const RayCaster& caster, const Atmosphere& atmosphere, int row);
   Pixel shade(const RayCaster& caster, const Atmosphere& atmosphere, const RayPacket& packet, std::size_t lane,
-              const Eigen::Vector3d& from, const Eigen::Vector3f& direction) const;
+              const Eigen::Vector3d& from) const;
   void lag(int row, const Vector6d& twist);
   void optics(int threads);
   void update_pattern(double time, int threads);
   void digitize(int row, double time, std::uint64_t frame, ThermalImage& image) const;
+  std::size_t row_begin(int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(config_.camera.width);
+  }
 
   ThermalConfig config_;
   std::uint64_t seed_;
   BandRadiance band_;
   float wall_celsius_ = 10.0F, air_radiance_ = 0.0F, sky_radiance_ = 0.0F, wall_radiance_ = 0.0F;
-  std::vector<Eigen::Vector3f> rays_;
-  std::vector<Pose> poses_;
-  std::vector<Pixel> pixels_;
+  std::vector<TileRays> tiles_;                   // row by row
+  std::vector<float> plane_x_, plane_y_, ray_z_;  // per pixel: x / z, y / z and z of the unit ray
+  std::vector<Pose> poses_;                       // per row
+  std::vector<float> radiance_, range_;           // per pixel, as in Pixel
+  std::vector<std::uint32_t> key_;
   std::vector<float> radiance_image_, work_;
   std::vector<float> pattern_;
   std::vector<float> kernel_, columns_;
