@@ -8,11 +8,13 @@
 
 #include "components/tunnel_simulator/normal_table.hpp"
 #include "components/tunnel_simulator/parallel.hpp"
+#include "components/tunnel_simulator/pose_samples.hpp"
 
 namespace adit::tunnel_simulator {
 namespace {
 
-constexpr int kTile = 4;  // rings and columns of a packet
+constexpr int kTile = 4;        // rings and columns of a packet
+constexpr double kKnot = 2e-3;  // of the pose's interpolation [s]
 
 // Powers are in units of the detection limit: a 10 % target seen square at detection_range has strength 1.
 double strength_at(double reflectivity, double range, double detection_range) {
@@ -304,11 +306,7 @@ void Lidar::sweep(const RayCaster& caster, const Atmosphere& atmosphere, const P
           std::llround(1e9 * (column_time(static_cast<int>(i % columns)) + b.time_offset[i / columns])));
     }
   }
-  parallel_for(threads, columns / 64 + 1, [&](std::size_t block) {
-    for (std::size_t c = block * 64; c < std::min(columns + 1, block * 64 + 64); ++c) {
-      poses_[c] = pose(time + column_time(static_cast<int>(c)));
-    }
-  });
+  sample_poses(pose, time, column_time(1), kKnot, poses_);
   const std::size_t strips = (columns + kTile - 1) / kTile;
   parallel_for(threads, strips, [&](std::size_t strip) {
     const int first = static_cast<int>(strip) * kTile;

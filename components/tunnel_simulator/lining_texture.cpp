@@ -1,8 +1,8 @@
 #include "components/tunnel_simulator/lining_texture.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <span>
 
 #include "components/tunnel_simulator/equipment.hpp"
 #include "components/tunnel_simulator/noise.hpp"
@@ -10,15 +10,6 @@
 
 namespace adit::tunnel_simulator {
 namespace {
-
-constexpr float kMargin = 0.8F;
-
-// Binary logarithm of a positive normal number to 0.009: exponent, and a parabola through the mantissa.
-float log2_of(float x) {
-  const auto bits = std::bit_cast<std::uint32_t>(x);
-  const float t = std::bit_cast<float>((bits & 0x7fffffU) | 0x3f800000U) - 1.0F;
-  return static_cast<float>(static_cast<int>(bits >> 23) - 127) + t + 0.343F * t * (1.0F - t);
-}
 
 std::uint64_t key(const WorldDescription& world, const Chunk& chunk) {
   return mix(world.seed, 7000 + chunk.volume);
@@ -68,12 +59,14 @@ class Canvas {
   }
   // Value noise of one wavelength, zero mean, unit variance, times amplitude.
   void add_noise(double wavelength_s, double wavelength_u, float amplitude, std::uint32_t seed) {
+    std::vector<float> x(static_cast<std::size_t>(width_));
+    for (int i = 0; i < width_; ++i) {
+      x[static_cast<std::size_t>(i)] = static_cast<float>(((i + 0.5) * texel_ + begin_) / wavelength_s);
+    }
+    const NoiseRow noise(x);
     for (int j = 0; j < height_; ++j) {
       const auto y = static_cast<float>((j + 0.5) * texel_ / wavelength_u);
-      float* row = values_.data() + static_cast<std::size_t>(j) * static_cast<std::size_t>(width_);
-      for (int i = 0; i < width_; ++i) {
-        row[i] += amplitude * value_noise(static_cast<float>(((i + 0.5) * texel_ + begin_) / wavelength_s), y, seed);
-      }
+      noise.add(y, seed, amplitude, std::span(values_).subspan(static_cast<std::size_t>(j) * x.size(), x.size()));
     }
   }
 
@@ -219,8 +212,8 @@ LiningTexture::LiningTexture(const WorldDescription& world, const Chunk& chunk, 
 
   const float texel = open ? 0.1F : 0.025F;
   Chunk padded = chunk;  // so that filtering near the chunk's border sees what lies beyond
-  padded.begin -= kMargin;
-  padded.end += kMargin;
+  padded.begin -= LiningTexture::kMargin;
+  padded.end += LiningTexture::kMargin;
   Canvas kelvin(padded, v.profile.perimeter(), texel);
   paint_temperature(kelvin, world, padded);
   levels_[0] = {kelvin.width(), kelvin.height(), 0, 1.0F / texel, 1.0F / texel};
@@ -228,6 +221,7 @@ LiningTexture::LiningTexture(const WorldDescription& world, const Chunk& chunk, 
   for (float k : kelvin.values()) {
     temperature_.push_back(static_cast<std::int16_t>(std::lround(std::clamp(1000.0F * k, -32000.0F, 32000.0F))));
   }
+  log_texels_ = std::log2(1.0F / texel);
   build_levels();
 }
 
@@ -238,8 +232,10 @@ void LiningTexture::build_levels() {
       if (ls == 0 && lu == 0) continue;
       const bool halve_s = ls > 0;
       const Level from = levels_[halve_s ? index(ls - 1, lu) : index(0, lu - 1)];
-      Level to{halve_s ? (from.width + 1) / 2 : from.width, halve_s ? from.height : (from.height + 1) / 2,
-               temperature_.size(), halve_s ? 0.5F * from.per_s : from.per_s, halve_s ? from.per_u : 0.5F * from.per_u};
+      // At least two texels each way: sample() reads pairs.
+      Level to{halve_s ? std::max(2, (from.width + 1) / 2) : from.width,
+               halve_s ? from.height : std::max(2, (from.height + 1) / 2), temperature_.size(),
+               halve_s ? 0.5F * from.per_s : from.per_s, halve_s ? from.per_u : 0.5F * from.per_u};
       levels_[index(ls, lu)] = to;
       const auto at = [&](int x, int y) {
         return temperature_[from.offset +
@@ -255,46 +251,6 @@ void LiningTexture::build_levels() {
       }
     }
   }
-}
-
-float LiningTexture::sample(const Level& level, float x, float y) const {
-  x = std::clamp(x - 0.5F, 0.0F, static_cast<float>(level.width - 1));
-  y = std::clamp(y - 0.5F, 0.0F, static_cast<float>(level.height - 1));
-  const int x0 = static_cast<int>(x);
-  const int y0 = static_cast<int>(y);
-  const int x1 = std::min(x0 + 1, level.width - 1);
-  const int y1 = std::min(y0 + 1, level.height - 1);
-  const float tx = x - static_cast<float>(x0);
-  const float ty = y - static_cast<float>(y0);
-  const std::int16_t* base = temperature_.data() + level.offset;
-  const auto at = [&](int i, int j) { return static_cast<float>(base[j * level.width + i]); };
-  const float top = at(x0, y0) + tx * (at(x1, y0) - at(x0, y0));
-  const float bottom = at(x0, y1) + tx * (at(x1, y1) - at(x0, y1));
-  return top + ty * (bottom - top);
-}
-
-float LiningTexture::temperature(float s, float u, float footprint_s2, float footprint_u2) const {
-  if (temperature_.empty()) return 0.0F;
-  const float per_texel2 = levels_[0].per_s * levels_[0].per_s;
-  const float wanted_s = std::clamp(0.5F * log2_of(footprint_s2 * per_texel2), 0.0F, kLevelsS - 1.001F);
-  const float wanted_u = std::clamp(0.5F * log2_of(footprint_u2 * per_texel2) + 0.5F, 0.0F, kLevelsU - 1.0F);
-  const int ls = static_cast<int>(wanted_s);
-  const int lu = static_cast<int>(wanted_u);
-  const float blend = wanted_s - static_cast<float>(ls);
-  const Level& level = levels_[static_cast<std::size_t>(lu * kLevelsS + ls)];
-  const float x = (s + kMargin) * level.per_s;
-  const float y = u * level.per_u;
-  const float a = sample(level, x, y);
-  if (blend <= 0.0F) return 1e-3F * a;
-  return 1e-3F * (a + blend * (sample((&level)[1], 0.5F * x, y) - a));
-}
-
-float LiningTexture::reflectivity(float s, float u) const {
-  const int x = std::clamp(static_cast<int>(s * reflectivity_per_metre_), 0, reflectivity_width_ - 1);
-  const int y = std::clamp(static_cast<int>(u * reflectivity_per_metre_), 0, reflectivity_height_ - 1);
-  return static_cast<float>(reflectivity_[static_cast<std::size_t>(y) * static_cast<std::size_t>(reflectivity_width_) +
-                                          static_cast<std::size_t>(x)]) *
-         (1.0F / 64.0F);
 }
 
 }  // namespace adit::tunnel_simulator

@@ -79,4 +79,29 @@ float fractal_noise(float x, float y, float z, int octaves, float gain, std::uin
                  [&](float f, std::uint32_t i) { return value_noise(x * f, y * f, z * f, seed + i * 0x51ed270bU); });
 }
 
+NoiseRow::NoiseRow(std::span<const float> x) {
+  for (const float place : x) {
+    const float cell = std::floor(place);
+    const auto index = static_cast<std::int32_t>(cell);
+    if (cells_.empty() || cells_.back().index != index) cells_.push_back({index, fades_.size()});
+    fades_.push_back(fade(place - cell));
+    cells_.back().end = fades_.size();
+  }
+}
+
+void NoiseRow::add(float y, std::uint32_t seed, float amplitude, std::span<float> out) const {
+  const float cell = std::floor(y);
+  const auto iy = static_cast<std::int32_t>(cell);
+  const float ty = fade(y - cell);
+  const auto column = [&](std::int32_t ix) {
+    return amplitude * kScale2 * mix(lattice(ix, iy, seed), lattice(ix, iy + 1, seed), ty);
+  };
+  std::size_t i = 0;
+  for (const Cell& c : cells_) {
+    const float left = column(c.index);
+    const float step = column(c.index + 1) - left;
+    for (; i < c.end; ++i) out[i] += left + fades_[i] * step;
+  }
+}
+
 }  // namespace adit::tunnel_simulator

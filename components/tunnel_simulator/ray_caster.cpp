@@ -3,8 +3,6 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <mutex>
@@ -21,14 +19,6 @@ static_assert(offsetof(RayPacket, object) == offsetof(RTCRayHit16, hit.instID));
 
 constexpr double kGrid = 8.0;  // places are rounded to this, so that small motions change nothing
 
-// All that shading needs of a triangle, in one cache line.
-struct alignas(64) Facet {
-  double nx, ny, nz, offset;       // unit normal n and n . p of its plane, object frame
-  float s, s_v, s_w, u, u_v, u_w;  // lining coordinates are affine in the hit's barycentric (v, w)
-  std::uint32_t surface, unused = 0;
-};
-static_assert(sizeof(Facet) == 64);
-
 Facet facet_of(const Mesh& mesh, const MeshTriangle& t) {
   const MeshVertex& a = mesh.vertices[t.a];
   const MeshVertex& b = mesh.vertices[t.b];
@@ -38,20 +28,23 @@ Facet facet_of(const Mesh& mesh, const MeshTriangle& t) {
   return {n.x(), n.y(), n.z(), n.dot(a.position), a.s, b.s - a.s, c.s - a.s, a.u, b.u - a.u, c.u - a.u, t.surface};
 }
 
-// A mesh in Embree with what shading needs.
-struct Solid {
-  std::vector<Facet> facets;
-  std::vector<Surface> surfaces;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  Eigen::Vector3f axis = Eigen::Vector3f::UnitX();
-  Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  // world <- object
-  std::size_t chunk = 0;
+std::array<float, 12> columns(const Eigen::Matrix3d& r, const Eigen::Vector3d& t) {
+  std::array<float, 12> out{};
+  for (int c = 0; c < 3; ++c) {
+    for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(3 * c + i)] = static_cast<float>(r(i, c));
+  }
+  for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(9 + i)] = static_cast<float>(t[i]);
+  return out;
+}
+
+}  // namespace
+
+struct RayCaster::EmbreeSolid : Solid {
   RTCScene scene = nullptr;
   mutable std::mutex baking;
-  mutable std::atomic<bool> baked{false};
-  mutable LiningTexture texture;
 
-  Solid(RTCDevice device, Mesh mesh) : surfaces(std::move(mesh.surfaces)) {
+  EmbreeSolid(RTCDevice device, Mesh mesh) {
+    surfaces = std::move(mesh.surfaces);
     facets.reserve(mesh.triangles.size());
     for (const MeshTriangle& t : mesh.triangles) facets.push_back(facet_of(mesh, t));
     scene = rtcNewScene(device);
@@ -74,32 +67,10 @@ struct Solid {
     rtcReleaseGeometry(geometry);
     rtcCommitScene(scene);
   }
-  // Of the lining; baked when it is first seen.
-  const LiningTexture& lining(const World& world, bool thermal) const {
-    if (!baked.load(std::memory_order_acquire)) {
-      const std::lock_guard lock(baking);
-      if (!baked.load(std::memory_order_relaxed)) {
-        texture = LiningTexture(world.description(), world.chunks()[chunk], thermal);
-        baked.store(true, std::memory_order_release);
-      }
-    }
-    return texture;
-  }
-  ~Solid() { rtcReleaseScene(scene); }
-  Solid(const Solid&) = delete;
-  Solid& operator=(const Solid&) = delete;
+  ~EmbreeSolid() { rtcReleaseScene(scene); }
+  EmbreeSolid(const EmbreeSolid&) = delete;
+  EmbreeSolid& operator=(const EmbreeSolid&) = delete;
 };
-
-std::array<float, 12> columns(const Eigen::Matrix3d& r, const Eigen::Vector3d& t) {
-  std::array<float, 12> out{};
-  for (int c = 0; c < 3; ++c) {
-    for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(3 * c + i)] = static_cast<float>(r(i, c));
-  }
-  for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(9 + i)] = static_cast<float>(t[i]);
-  return out;
-}
-
-}  // namespace
 
 struct RayCaster::Impl {
   const World& world;
@@ -107,10 +78,8 @@ struct RayCaster::Impl {
   RTCDevice device;
   RTCScene top = nullptr;
   Eigen::Vector3d origin = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  std::vector<std::shared_ptr<Solid>> cache;  // by chunk index, null when far
-  std::vector<std::shared_ptr<Solid>> movers;
-  std::vector<const Solid*> slots;  // by instance id; movers last
-  std::size_t static_slots = 0;
+  std::vector<std::shared_ptr<EmbreeSolid>> cache;  // by chunk index, null when far
+  std::vector<std::shared_ptr<EmbreeSolid>> movers;
 
   Impl(const World& w, const Config& c) : world(w), config(c), device(rtcNewDevice("threads=1,set_affinity=0")) {}
   ~Impl() {
@@ -120,7 +89,7 @@ struct RayCaster::Impl {
     rtcReleaseDevice(device);
   }
 
-  void attach(const Solid& solid, unsigned id, unsigned steps) {
+  void attach(const EmbreeSolid& solid, unsigned id, unsigned steps) {
     RTCGeometry instance = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
     rtcSetGeometryInstancedScene(instance, solid.scene);
     rtcSetGeometryTimeStepCount(instance, steps);
@@ -137,7 +106,7 @@ struct RayCaster::Impl {
 RayCaster::RayCaster(const World& world, const Config& config, std::vector<Mesh> movers)
     : impl_(std::make_unique<Impl>(world, config)) {
   impl_->cache.resize(world.chunks().size());
-  for (Mesh& mesh : movers) impl_->movers.push_back(std::make_shared<Solid>(impl_->device, std::move(mesh)));
+  for (Mesh& mesh : movers) impl_->movers.push_back(std::make_shared<EmbreeSolid>(impl_->device, std::move(mesh)));
 }
 
 RayCaster::~RayCaster() = default;
@@ -163,7 +132,7 @@ void RayCaster::look_from(const Eigen::Vector3d& place) {
   }
   parallel_for(d.config.threads, missing.size(), [&](std::size_t k) {
     const std::size_t i = missing[k];
-    auto solid = std::make_shared<Solid>(d.device, d.world.build_mesh(i));
+    auto solid = std::make_shared<EmbreeSolid>(d.device, d.world.build_mesh(i));
     solid->centre = chunks[i].bounds.center();
     solid->chunk = i;
     if (!d.world.description().volumes.empty()) {
@@ -176,17 +145,17 @@ void RayCaster::look_from(const Eigen::Vector3d& place) {
   if (d.top != nullptr) rtcReleaseScene(d.top);
   d.top = rtcNewScene(d.device);
   rtcSetSceneFlags(d.top, RTC_SCENE_FLAG_ROBUST);
-  d.slots.clear();
+  slots_.clear();
   for (std::size_t i = 0; i < chunks.size(); ++i) {
     if (!d.cache[i] || chunks[i].bounds.exteriorDistance(rounded) > d.config.radius) continue;
     if (d.cache[i]->facets.empty()) continue;
-    d.attach(*d.cache[i], static_cast<unsigned>(d.slots.size()), 1);
-    d.slots.push_back(d.cache[i].get());
+    d.attach(*d.cache[i], static_cast<unsigned>(slots_.size()), 1);
+    slots_.push_back(d.cache[i].get());
   }
-  d.static_slots = d.slots.size();
+  static_slots_ = slots_.size();
   for (const auto& mover : d.movers) {
-    d.attach(*mover, static_cast<unsigned>(d.slots.size()), 2);
-    d.slots.push_back(mover.get());
+    d.attach(*mover, static_cast<unsigned>(slots_.size()), 2);
+    slots_.push_back(mover.get());
   }
   rtcCommitScene(d.top);
 }
@@ -194,7 +163,7 @@ void RayCaster::look_from(const Eigen::Vector3d& place) {
 void RayCaster::move(std::span<const std::array<Pose, 2>> poses) {
   Impl& d = *impl_;
   for (std::size_t i = 0; i < std::min(poses.size(), d.movers.size()); ++i) {
-    RTCGeometry instance = rtcGetGeometry(d.top, static_cast<unsigned>(d.static_slots + i));
+    RTCGeometry instance = rtcGetGeometry(d.top, static_cast<unsigned>(static_slots_ + i));
     for (unsigned step = 0; step < 2; ++step) {
       const Pose& pose = poses[i][step];
       const auto transform = columns(pose.linear(), pose.translation() - d.origin);
@@ -221,50 +190,52 @@ void RayCaster::cast(RayPacket& packet) const {
   rtcIntersect16(valid.data(), impl_->top, &context, reinterpret_cast<RTCRayHit16*>(&packet));
 }
 
-void RayCaster::prefetch(const RayPacket& packet) const {
+void RayCaster::bake(const Solid& solid) const {
+  const auto& lock_of = static_cast<const EmbreeSolid&>(solid);
+  const std::lock_guard lock(lock_of.baking);
+  if (solid.baked.load(std::memory_order_relaxed)) return;
+  solid.texture = LiningTexture(impl_->world.description(), impl_->world.chunks()[solid.chunk], impl_->config.thermal);
+  solid.baked.store(true, std::memory_order_release);
+}
+
+void RayCaster::surfaces(const RayPacket& packet, HitPacket& hits) const {
+  hits.nx = packet.nx;
+  hits.ny = packet.ny;
+  hits.nz = packet.nz;
   for (std::size_t lane = 0; lane < kPacket; ++lane) {
-    if (packet.hit(lane)) __builtin_prefetch(&impl_->slots[packet.object[lane]]->facets[packet.triangle[lane]]);
+    hits.texture[lane] = nullptr;
+    hits.key[lane] = 0;
+    hits.s[lane] = hits.u[lane] = hits.ax[lane] = hits.ay[lane] = hits.temperature[lane] = 0.0F;
+    if (!packet.hit(lane)) continue;
+    const Solid& solid = *slots_[packet.object[lane]];
+    const Facet& f = solid.facets[packet.triangle[lane]];
+    const Surface& surface = solid.surfaces[f.surface];
+    hits.temperature[lane] = surface.temperature;
+    hits.emissivity[lane] = properties(surface.material).emissivity;
+    if (surface.lining) {
+      const float v = packet.u[lane], w = packet.v[lane];
+      hits.s[lane] = f.s + v * f.s_v + w * f.s_w;
+      hits.u[lane] = f.u + v * f.u_v + w * f.u_w;
+      hits.ax[lane] = solid.axis.x();
+      hits.ay[lane] = solid.axis.y();
+      if (!solid.baked.load(std::memory_order_acquire)) bake(solid);
+      hits.texture[lane] = &solid.texture;
+      hits.key[lane] = 1U + static_cast<std::uint32_t>(surface.material);
+    } else {
+      hits.key[lane] = 1000U + packet.object[lane] * 65536U + f.surface;
+      if (is_mover(packet, lane)) {
+        const Eigen::Vector3f n = solid.turn * Eigen::Vector3f(packet.nx[lane], packet.ny[lane], packet.nz[lane]);
+        hits.nx[lane] = n.x();
+        hits.ny[lane] = n.y();
+        hits.nz[lane] = n.z();
+      }
+    }
   }
-}
-
-double RayCaster::exact_range(const RayPacket& packet, std::size_t lane, const Eigen::Vector3d& from,
-                              const Eigen::Vector3d& direction) const {
-  if (is_mover(packet, lane)) return packet.far[lane];
-  const Solid& solid = *impl_->slots[packet.object[lane]];
-  const Facet& f = solid.facets[packet.triangle[lane]];
-  const double along = f.nx * direction.x() + f.ny * direction.y() + f.nz * direction.z();
-  const double above = f.nx * (from.x() - solid.centre.x()) + f.ny * (from.y() - solid.centre.y()) +
-                       f.nz * (from.z() - solid.centre.z());
-  const double range = (f.offset - above) / along;
-  // A sliver seen edge-on has no usable plane: keep what the traversal found.
-  return std::abs(range - packet.far[lane]) < 0.01 ? range : packet.far[lane];
-}
-
-SurfaceHit RayCaster::surface(const RayPacket& packet, std::size_t lane) const {
-  const Solid& solid = *impl_->slots[packet.object[lane]];
-  const Facet& f = solid.facets[packet.triangle[lane]];
-  SurfaceHit hit;
-  hit.surface = &solid.surfaces[f.surface];
-  hit.normal = Eigen::Vector3f(static_cast<float>(f.nx), static_cast<float>(f.ny), static_cast<float>(f.nz));
-  if (is_mover(packet, lane)) hit.normal = solid.turn * hit.normal;
-  hit.axis = solid.axis;
-  hit.key = packet.object[lane] * 65536U + f.surface;
-  if (!hit.surface->lining) return hit;
-  const float v = packet.u[lane];
-  const float w = packet.v[lane];
-  hit.s = f.s + v * f.s_v + w * f.s_w;
-  hit.u = f.u + v * f.u_v + w * f.u_w;
-  hit.texture = &solid.lining(impl_->world, impl_->config.thermal);
-  return hit;
-}
-
-bool RayCaster::is_mover(const RayPacket& packet, std::size_t lane) const {
-  return packet.object[lane] >= impl_->static_slots;
 }
 
 std::size_t RayCaster::triangle_count() const {
   std::size_t sum = 0;
-  for (const Solid* s : impl_->slots) sum += s->facets.size();
+  for (const Solid* s : slots_) sum += s->facets.size();
   return sum;
 }
 

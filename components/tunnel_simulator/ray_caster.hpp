@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -42,6 +44,25 @@ struct SurfaceHit {
   Eigen::Vector3f axis = Eigen::Vector3f::UnitX();    // of the tunnel, world
 };
 
+// All that shading needs of a triangle, in one cache line.
+struct alignas(64) Facet {
+  double nx, ny, nz, offset;       // unit normal n and n . p of its plane, object frame
+  float s, s_v, s_w, u, u_v, u_w;  // lining coordinates are affine in the hit's barycentric (v, w)
+  std::uint32_t surface, unused = 0;
+};
+static_assert(sizeof(Facet) == 64);
+
+// What a thermal camera needs of sixteen hits at once. Lanes without a hit have no surface.
+struct HitPacket {
+  RayPacket::F s, u;         // lining coordinates
+  RayPacket::F nx, ny, nz;   // along the normal, world, of any length
+  RayPacket::F ax, ay;       // axis of the tunnel, world (its z is 0)
+  RayPacket::F temperature;  // of the surface, texture aside
+  RayPacket::F emissivity;
+  RayPacket::U key;  // equal for equal surfaces of one object, and for one lining through all its chunks
+  std::array<const LiningTexture*, kPacket> texture;
+};
+
 class RayCaster {
  public:
   struct Config {
@@ -65,18 +86,76 @@ class RayCaster {
   // Thread-safe. All lanes are cast; fill unused ones with far = -1.
   void cast(RayPacket& packet) const;
   // Has the memory fetched that exact_range() and surface() will need, all lanes at once.
-  void prefetch(const RayPacket& packet) const;
+  void prefetch(const RayPacket& packet) const {
+    for (std::size_t lane = 0; lane < kPacket; ++lane) {
+      if (packet.hit(lane)) __builtin_prefetch(slots_[packet.object[lane]]->facets.data() + packet.triangle[lane]);
+    }
+  }
   // Range along a double-precision ray (world coordinates) to the plane of the triangle a lane hit: removes the float
   // rounding of the traversal. Moving objects: the float range.
   double exact_range(const RayPacket& packet, std::size_t lane, const Eigen::Vector3d& from,
                      const Eigen::Vector3d& direction) const;
   SurfaceHit surface(const RayPacket& packet, std::size_t lane) const;
+  // The same for all lanes.
+  void surfaces(const RayPacket& packet, HitPacket& hits) const;
   bool is_mover(const RayPacket& packet, std::size_t lane) const;
   std::size_t triangle_count() const;
 
  private:
+  struct Solid {  // a mesh as shading sees it
+    std::vector<Facet> facets;
+    std::vector<Surface> surfaces;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    Eigen::Vector3f axis = Eigen::Vector3f::UnitX();
+    Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  // world <- object
+    std::size_t chunk = 0;
+    mutable std::atomic<bool> baked{false};
+    mutable LiningTexture texture;
+  };
+  struct EmbreeSolid;
   struct Impl;
+  // Bakes the solid's texture, once.
+  void bake(const Solid& solid) const;
+
   std::unique_ptr<Impl> impl_;
+  std::vector<const Solid*> slots_;  // by instance id; movers last
+  std::size_t static_slots_ = 0;
 };
+
+inline bool RayCaster::is_mover(const RayPacket& packet, std::size_t lane) const {
+  return packet.object[lane] >= static_slots_;
+}
+
+inline double RayCaster::exact_range(const RayPacket& packet, std::size_t lane, const Eigen::Vector3d& from,
+                                     const Eigen::Vector3d& direction) const {
+  if (is_mover(packet, lane)) return packet.far[lane];
+  const Solid& solid = *slots_[packet.object[lane]];
+  const Facet& f = solid.facets[packet.triangle[lane]];
+  const double along = f.nx * direction.x() + f.ny * direction.y() + f.nz * direction.z();
+  const double above = f.nx * (from.x() - solid.centre.x()) + f.ny * (from.y() - solid.centre.y()) +
+                       f.nz * (from.z() - solid.centre.z());
+  const double range = (f.offset - above) / along;
+  // A sliver seen edge-on has no usable plane: keep what the traversal found.
+  return std::abs(range - packet.far[lane]) < 0.01 ? range : packet.far[lane];
+}
+
+inline SurfaceHit RayCaster::surface(const RayPacket& packet, std::size_t lane) const {
+  const Solid& solid = *slots_[packet.object[lane]];
+  const Facet& f = solid.facets[packet.triangle[lane]];
+  SurfaceHit hit;
+  hit.surface = &solid.surfaces[f.surface];
+  hit.normal = Eigen::Vector3f(static_cast<float>(f.nx), static_cast<float>(f.ny), static_cast<float>(f.nz));
+  if (is_mover(packet, lane)) hit.normal = solid.turn * hit.normal;
+  hit.axis = solid.axis;
+  hit.key = packet.object[lane] * 65536U + f.surface;
+  if (!hit.surface->lining) return hit;
+  const float v = packet.u[lane];
+  const float w = packet.v[lane];
+  hit.s = f.s + v * f.s_v + w * f.s_w;
+  hit.u = f.u + v * f.u_v + w * f.u_w;
+  if (!solid.baked.load(std::memory_order_acquire)) bake(solid);
+  hit.texture = &solid.texture;
+  return hit;
+}
 
 }  // namespace adit::tunnel_simulator

@@ -7,15 +7,14 @@
 #include "components/tunnel_simulator/noise.hpp"
 #include "components/tunnel_simulator/normal_table.hpp"
 #include "components/tunnel_simulator/parallel.hpp"
+#include "components/tunnel_simulator/pose_samples.hpp"
 #include "components/tunnel_simulator/random.hpp"
 
 namespace adit::tunnel_simulator {
 namespace {
 
 constexpr int kTile = 4;
-constexpr float kTableBegin = -60.0F;
-constexpr float kTableEnd = 200.0F;
-constexpr float kTableStep = 0.25F;
+constexpr double kKnot = 2e-3;  // of the pose's interpolation [s]
 
 // Ages of the samples of an exponential trail [time constants]: the medians of `taps` equally likely parts.
 constexpr int kMostTaps = 10;
@@ -47,15 +46,9 @@ double band_radiance(double kelvin) {
 }  // namespace
 
 BandRadiance::BandRadiance() {
-  for (float t = kTableBegin; t <= kTableEnd; t += kTableStep) {
+  for (float t = kBegin; t <= kEnd; t += kStep) {
     table_.push_back(static_cast<float>(band_radiance(static_cast<double>(t) + 273.15)));
   }
-}
-
-float BandRadiance::at(float celsius) const {
-  const float x = std::clamp((celsius - kTableBegin) / kTableStep, 0.0F, static_cast<float>(table_.size()) - 1.001F);
-  const auto i = static_cast<std::size_t>(x);
-  return table_[i] + (x - static_cast<float>(i)) * (table_[i + 1] - table_[i]);
 }
 
 float BandRadiance::slope_at(float celsius) const {
@@ -99,41 +92,56 @@ ThermalCamera::ThermalCamera(ThermalConfig config, std::uint64_t seed) : config_
   }
 }
 
-ThermalCamera::Pixel ThermalCamera::shade(const RayCaster& caster, const Atmosphere& atmosphere,
-                                          const RayPacket& packet, std::size_t lane,
-                                          const Eigen::Vector3d& from) const {
-  Pixel out;
-  const Eigen::Vector3f direction(packet.dx[lane], packet.dy[lane], packet.dz[lane]);
-  if (!packet.hit(lane)) {
-    out.radiance = direction.z() > 0.03F ? sky_radiance_ : wall_radiance_;
-  } else {
-    out.range = packet.far[lane];
-    const SurfaceHit hit = caster.surface(packet, lane);
-    out.key = 1000U + hit.key;
-    float kelvin = hit.surface->temperature;
-    if (hit.texture != nullptr) {
-      out.key = 1U + static_cast<std::uint32_t>(hit.surface->material);  // one lining through all chunks
-      // The pixel's footprint is stretched along the direction in which the wall is seen at a slant.
-      const float slant = direction.dot(hit.normal);
-      const float cosine2 = std::max(0.0004F, slant * slant);
-      const float across2 = 1.0F - std::min(1.0F, slant * slant);
-      const float along = direction.dot(hit.axis) - slant * hit.normal.dot(hit.axis);
-      const float share = across2 > 1e-6F ? std::min(1.0F, along * along / across2) : 0.0F;
-      const float stretch = 1.0F / cosine2 - 1.0F;
-      const float footprint = out.range / static_cast<float>(config_.camera.fx);
-      const float area = footprint * footprint;
-      kelvin += hit.texture->temperature(hit.s, hit.u, area * (1.0F + stretch * share),
-                                         area * (1.0F + stretch * (1.0F - share)));
+namespace {
+
+// Logarithms of the footprints of pixels on the lining: a pixel is stretched along the direction in which it sees the
+// wall at a slant. `size`: of a pixel seen square at range 1 [m]. Loops over plain arrays: they vectorize.
+void footprints(const RayPacket& rays, const HitPacket& hits, float size, RayPacket::F& log_s, RayPacket::F& log_u) {
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const float norm2 = hits.nx[i] * hits.nx[i] + hits.ny[i] * hits.ny[i] + hits.nz[i] * hits.nz[i];
+    const float scale = 1.0F / std::sqrt(std::max(norm2, 1e-30F));
+    const float slant = scale * (rays.dx[i] * hits.nx[i] + rays.dy[i] * hits.ny[i] + rays.dz[i] * hits.nz[i]);
+    const float slant2 = std::min(1.0F, slant * slant);
+    const float axis = scale * (hits.ax[i] * hits.nx[i] + hits.ay[i] * hits.ny[i]);
+    const float along = rays.dx[i] * hits.ax[i] + rays.dy[i] * hits.ay[i] - slant * axis;
+    const float share = std::min(1.0F, along * along / std::max(1e-6F, 1.0F - slant2));
+    const float stretch = 1.0F / std::max(0.0004F, slant2) - 1.0F;
+    const float side = rays.far[i] * size;
+    const float area = side * side;
+    log_s[i] = 0.5F * log2_of(area * (1.0F + stretch * share));
+    log_u[i] = 0.5F * log2_of(area * (1.0F + stretch * (1.0F - share)));
+  }
+}
+
+}  // namespace
+
+void ThermalCamera::shade(const RayCaster& caster, const Atmosphere& atmosphere, const RayPacket& packet,
+                          const Eigen::Vector3d& from, Pixels& out) const {
+  HitPacket hits;
+  caster.surfaces(packet, hits);
+  RayPacket::F log_s, log_u;
+  footprints(packet, hits, 1.0F / static_cast<float>(config_.camera.fx), log_s, log_u);
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    if (!packet.hit(i)) {
+      out.radiance[i] = packet.dz[i] > 0.03F ? sky_radiance_ : wall_radiance_;
+      out.range[i] = 0.0F;
+      out.key[i] = 0;
+      continue;
     }
-    const float emissivity = properties(hit.surface->material).emissivity;
-    out.radiance = emissivity * band_.at(wall_celsius_ + kelvin) + (1.0F - emissivity) * air_radiance_;
+    float kelvin = hits.temperature[i];
+    if (hits.texture[i] != nullptr) kelvin += hits.texture[i]->temperature(hits.s[i], hits.u[i], log_s[i], log_u[i]);
+    out.radiance[i] =
+        hits.emissivity[i] * band_.at(wall_celsius_ + kelvin) + (1.0F - hits.emissivity[i]) * air_radiance_;
+    out.range[i] = packet.far[i];
+    out.key[i] = hits.key[i];
   }
-  if (!atmosphere.empty()) {
-    const double range = out.range > 0.0F ? static_cast<double>(out.range) : 500.0;
-    const auto clear = static_cast<float>(std::exp(-atmosphere.depth(from, direction.cast<double>(), range).thermal));
-    out.radiance = clear * out.radiance + (1.0F - clear) * air_radiance_;
+  if (atmosphere.empty()) return;
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    const double range = out.range[i] > 0.0F ? static_cast<double>(out.range[i]) : 500.0;
+    const Eigen::Vector3d direction(packet.dx[i], packet.dy[i], packet.dz[i]);
+    const auto clear = static_cast<float>(std::exp(-atmosphere.depth(from, direction, range).thermal));
+    out.radiance[i] = clear * out.radiance[i] + (1.0F - clear) * air_radiance_;
   }
-  return out;
 }
 
 void ThermalCamera::render_tile_row(const RayCaster& caster, const Atmosphere& atmosphere, int tile_row) {
@@ -148,11 +156,13 @@ void ThermalCamera::render_tile_row(const RayCaster& caster, const Atmosphere& a
       turn[k][lane] =
           static_cast<float>(pose.linear()(static_cast<Eigen::Index>(k % 3), static_cast<Eigen::Index>(k / 3)));
     }
-    const Eigen::Vector3f from = (pose.translation() - caster.origin()).cast<float>();
-    packet.ox[lane] = from.x();
-    packet.oy[lane] = from.y();
-    packet.oz[lane] = from.z();
+    const Eigen::Vector3f start = (pose.translation() - caster.origin()).cast<float>();
+    packet.ox[lane] = start.x();
+    packet.oy[lane] = start.y();
+    packet.oz[lane] = start.z();
   }
+  const Eigen::Vector3d from = poses_[static_cast<std::size_t>(tile_row * kTile)].translation();
+  Pixels pixels;
   const int tiles_across = (m.width + kTile - 1) / kTile;
   for (int t = 0; t < tiles_across; ++t) {
     const TileRays& rays = tiles_[static_cast<std::size_t>(tile_row * tiles_across + t)];
@@ -172,16 +182,12 @@ void ThermalCamera::render_tile_row(const RayCaster& caster, const Atmosphere& a
     }
     caster.cast(packet);
     caster.prefetch(packet);
+    shade(caster, atmosphere, packet, from, pixels);
     for (int r = 0; r < rows; ++r) {
-      const int y = tile_row * kTile + r;
-      for (int c = 0; c < columns; ++c) {
-        const Pixel pixel = shade(caster, atmosphere, packet, static_cast<std::size_t>(r * kTile + c),
-                                  poses_[static_cast<std::size_t>(y)].translation());
-        const std::size_t i = row_begin(y) + static_cast<std::size_t>(t * kTile + c);
-        radiance_[i] = pixel.radiance;
-        range_[i] = pixel.range;
-        key_[i] = pixel.key;
-      }
+      const std::size_t first = row_begin(tile_row * kTile + r) + static_cast<std::size_t>(t * kTile);
+      std::copy_n(pixels.radiance.data() + r * kTile, columns, radiance_.data() + first);
+      std::copy_n(pixels.range.data() + r * kTile, columns, range_.data() + first);
+      std::copy_n(pixels.key.data() + r * kTile, columns, key_.data() + first);
     }
   }
 }
@@ -197,6 +203,7 @@ void ThermalCamera::resample_edges(const RayCaster& caster, const Atmosphere& at
   const float offset = 0.25F / static_cast<float>(m.fx);
   std::array<int, 4> pending{};
   std::size_t waiting = 0;
+  Pixels pixels;
   RayPacket packet;
   packet.time.fill(0.5F);
   packet.ox.fill(from.x());
@@ -216,12 +223,10 @@ void ThermalCamera::resample_edges(const RayCaster& caster, const Atmosphere& at
     }
     caster.cast(packet);
     caster.prefetch(packet);
+    shade(caster, atmosphere, packet, pose.translation(), pixels);
     for (std::size_t k = 0; k < waiting; ++k) {
-      float sum = 0.0F;
-      for (std::size_t lane = 4 * k; lane < 4 * k + 4; ++lane) {
-        sum += shade(caster, atmosphere, packet, lane, pose.translation()).radiance;
-      }
-      out[pending[k]] = 0.25F * sum;
+      const float* r = pixels.radiance.data() + 4 * k;
+      out[pending[k]] = 0.25F * (r[0] + r[1] + r[2] + r[3]);
     }
     waiting = 0;
   };
@@ -402,8 +407,7 @@ void ThermalCamera::capture(const RayCaster& caster, const Atmosphere& atmospher
   const RandomStream random(seed_, 206, frame);
   for (std::size_t x = 0; x < columns_.size(); ++x) columns_[x] = random.normal_pair(x).first;
 
-  parallel_for(threads, static_cast<std::size_t>(m.height),
-               [&](std::size_t y) { poses_[y] = pose(time + config_.row_time * static_cast<double>(y)); });
+  sample_poses(pose, time, config_.row_time, kKnot, poses_);
   const Atmosphere around = atmosphere.empty() ? atmosphere : atmosphere.near(poses_[0].translation(), 150.0);
   parallel_for(threads, static_cast<std::size_t>((m.height + kTile - 1) / kTile),
                [&](std::size_t y) { render_tile_row(caster, around, static_cast<int>(y)); });

@@ -2,6 +2,7 @@
 // microbolometer's time constant, fixed patterns that grow since the last shutter correction (FFC), 16-bit counts.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -17,9 +18,14 @@ namespace adit::tunnel_simulator {
 class BandRadiance {
  public:
   BandRadiance();
-  float at(float celsius) const;        // [W / (m2 sr)], -60 .. 200 degrees
+  float at(float celsius) const {  // [W / (m2 sr)], -60 .. 200 degrees
+    const float x = std::clamp((celsius - kBegin) / kStep, 0.0F, static_cast<float>(table_.size()) - 1.001F);
+    const auto i = static_cast<std::size_t>(x);
+    return table_[i] + (x - static_cast<float>(i)) * (table_[i + 1] - table_[i]);
+  }
   float slope_at(float celsius) const;  // [W / (m2 sr K)]
  private:
+  static constexpr float kBegin = -60.0F, kEnd = 200.0F, kStep = 0.25F;
   std::vector<float> table_;
 };
 
@@ -70,18 +76,18 @@ class ThermalCamera {
                std::uint64_t frame, int threads, ThermalImage& image);
 
  private:
-  struct Pixel {
-    float radiance = 0.0F;
-    float range = 0.0F;     // 0: nothing hit
-    std::uint32_t key = 0;  // of the thing hit: different keys, different things
+  struct Pixels {                  // of a packet
+    RayPacket::F radiance, range;  // range 0: nothing hit
+    RayPacket::U key;              // of the thing hit: different keys, different things
   };
   struct TileRays {  // of 4 x 4 pixels, camera frame
     RayPacket::F x, y, z;
   };
   void render_tile_row(const RayCaster& caster, const Atmosphere& atmosphere, int tile_row);
   void resample_edges(const RayCaster& caster, const Atmosphere& atmosphere, int row);
-  Pixel shade(const RayCaster& caster, const Atmosphere& atmosphere, const RayPacket& packet, std::size_t lane,
-              const Eigen::Vector3d& from) const;
+  // `from`: where the packet's rays start, near enough for smoke.
+  void shade(const RayCaster& caster, const Atmosphere& atmosphere, const RayPacket& packet,
+             const Eigen::Vector3d& from, Pixels& out) const;
   void lag(int row, const Vector6d& twist);
   void optics(int threads);
   void update_pattern(double time, int threads);
@@ -97,7 +103,7 @@ class ThermalCamera {
   std::vector<TileRays> tiles_;                   // row by row
   std::vector<float> plane_x_, plane_y_, ray_z_;  // per pixel: x / z, y / z and z of the unit ray
   std::vector<Pose> poses_;                       // per row
-  std::vector<float> radiance_, range_;           // per pixel, as in Pixel
+  std::vector<float> radiance_, range_;           // per pixel, as in Pixels
   std::vector<std::uint32_t> key_;
   std::vector<float> radiance_image_, work_;
   std::vector<float> pattern_;
