@@ -30,6 +30,7 @@ struct Equipment {
   double lamps = 12.0;  // both crown edges of a road, one row elsewhere
   double signs = 25.0;  // alternating walls
   double niches = 0.0;
+  double lay_bys = 0.0;
   double cabinets = 0.0;
   double fans = 0.0;
   double hydrants = 0.0;
@@ -78,6 +79,12 @@ Equipment equipment_of(VolumeKind kind, int feature_level);
 
 // Appends the niches, 2.0 x 1.2 x 2.5 m, alternating walls, that equipment.niches asks for.
 void add_niches(WorldDescription& world);
+// Appends the lay-bys, 40 m long, 3 m wide, on the right, that equipment.lay_bys asks for (where the tube has room).
+void add_lay_bys(WorldDescription& world);
+// A line of exactly `length` metres drawn from (seed, name): straights, and arcs between clothoids with radii from
+// `radius` to five times that; heading within 60 degrees of the start's, grade within `grade`. Does not cross itself.
+CenterLine random_line(const LineStart& start, double length, double radius, double grade, std::uint64_t seed,
+                       const std::string& name);
 // Appends a passage from station `at` of one volume straight to the axis of the other.
 void add_passage(WorldDescription& world, std::size_t from, std::size_t to, double at, double width, double height);
 

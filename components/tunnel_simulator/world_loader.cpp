@@ -53,7 +53,7 @@ Profile read_profile(YamlMap map, Material lining) {
   return profile;
 }
 
-CenterLine read_line(YamlMap& tube) {
+CenterLine read_line(YamlMap& tube, std::uint64_t seed, const std::string& name) {
   LineStart start;
   YamlMap at = tube.map("start");
   start.x = at.number("x", 0.0, -1e5, 1e5);
@@ -61,6 +61,14 @@ CenterLine read_line(YamlMap& tube) {
   start.z = at.number("z", 0.0, -1e4, 1e4);
   start.heading = at.number("heading", 0.0, -10.0, 10.0);
   at.finish();
+  if (tube.has("random_line")) {
+    YamlMap drawn = tube.map("random_line");
+    const double length = drawn.number("length", 1000.0, 50.0, 2e4);
+    const double radius = drawn.number("radius", 300.0, 15.0, 1e4);
+    const double grade = drawn.number("grade", 0.02, 0.0, 0.15);
+    drawn.finish();
+    return random_line(start, length, radius, grade, seed, name);
+  }
   std::vector<LineElement> elements;
   tube.require("line");
   double curvature = 0.0;
@@ -101,6 +109,7 @@ void read_equipment(YamlMap map, Equipment& e) {
   for (const auto& [key, value] : {std::pair<const char*, double*>{"lamps", &e.lamps},
                                    {"signs", &e.signs},
                                    {"niches", &e.niches},
+                                   {"lay_bys", &e.lay_bys},
                                    {"cabinets", &e.cabinets},
                                    {"fans", &e.fans},
                                    {"hydrants", &e.hydrants},
@@ -150,7 +159,7 @@ VolumeDescription read_tube(YamlMap& tube, const WorldDescription& world, int fe
     const double offset = tube.number("offset", 25.0, -500.0, 500.0);
     if (base != nullptr) v.line = base->line.parallel(offset);
   } else {
-    v.line = read_line(tube);
+    v.line = read_line(tube, world.seed, v.name);
   }
   if (base != nullptr && !tube.has("profile")) {
     v.profile = base->profile;
@@ -224,6 +233,7 @@ Result<WorldDescription> load_world(const std::string& path, int features, int t
   root.finish();
   if (!document.ok()) return document.error();
   add_niches(world);
+  add_lay_bys(world);
   return world;
 }
 

@@ -171,8 +171,8 @@ TEST(LiningTexture, FootprintsAverage) {
   int n = 0;
   for (float s = 1.0F; s < 19.0F; s += 0.037F) {
     for (float u = 12.0F; u < 20.0F; u += 0.31F) {
-      const double a = texture.temperature(s, u, 0.01F, 0.01F);
-      const double b = texture.temperature(s, u, 0.8F, 0.2F);
+      const double a = texture.temperature(s, u, std::log2(0.01F), std::log2(0.01F));
+      const double b = texture.temperature(s, u, std::log2(0.8F), std::log2(0.2F));
       fine += a * a;
       coarse += b * b;
       mean_fine += a;
@@ -194,8 +194,10 @@ TEST(LiningTexture, IsContinuousAcrossChunks) {
   const LiningTexture a(d, world.chunks()[0], true);
   const LiningTexture b(d, world.chunks()[1], true);
   for (float u = 1.0F; u < 25.0F; u += 0.21F) {
-    EXPECT_NEAR(a.temperature(20.0F, u, 0.02F, 0.02F), b.temperature(0.0F, u, 0.02F, 0.02F), 0.02);
-    EXPECT_NEAR(a.temperature(20.0F, u, 0.3F, 0.1F), b.temperature(0.0F, u, 0.3F, 0.1F), 0.02);
+    EXPECT_NEAR(a.temperature(20.0F, u, std::log2(0.02F), std::log2(0.02F)),
+                b.temperature(0.0F, u, std::log2(0.02F), std::log2(0.02F)), 0.02);
+    EXPECT_NEAR(a.temperature(20.0F, u, std::log2(0.3F), std::log2(0.1F)),
+                b.temperature(0.0F, u, std::log2(0.3F), std::log2(0.1F)), 0.02);
   }
 }
 
@@ -226,6 +228,57 @@ TEST(Atmosphere, RampsAlongATunnel) {
   a.add_along(line, 100.0, 200.0, 20.0, Obscurant::fog, 10.0, 12.0, 7.0);
   // The density is a trapezium: 60 m full, two ramps of 20 m at half of it on average.
   EXPECT_NEAR(a.depth({0.0, 0.0, 2.0}, Eigen::Vector3d::UnitX(), 300.0).lidar, 80.0 * 0.3912, 0.01);
+}
+
+TEST(RandomWorld, LineIsDrawnFromSeedAndName) {
+  const CenterLine a = random_line({}, 1500.0, 300.0, 0.03, 5, "main");
+  const CenterLine same = random_line({}, 1500.0, 300.0, 0.03, 5, "main");
+  const CenterLine other = random_line({}, 1500.0, 300.0, 0.03, 6, "main");
+  EXPECT_NEAR(a.length(), 1500.0, 1e-9);
+  EXPECT_EQ(a.at(1200.0).position, same.at(1200.0).position);
+  EXPECT_GT((a.at(1200.0).position - other.at(1200.0).position).norm(), 5.0);
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    const CenterLine line = random_line({}, 1500.0, 300.0, 0.03, seed, "main");
+    double turned = 0.0;
+    for (double s = 0.0; s < line.length(); s += 5.0) {
+      const LinePoint p = line.at(s);
+      EXPECT_LE(std::abs(p.curvature), 1.0 / 300.0 + 1e-12);
+      EXPECT_LE(std::abs(p.grade), 0.03 + 1e-12);
+      EXPECT_LE(std::abs(p.heading), std::numbers::pi / 3.0 + 0.01);
+      turned = std::max(turned, std::abs(p.heading));
+    }
+    EXPECT_GT(turned, 0.02) << seed;
+  }
+}
+
+TEST(RandomWorld, LayByOpensTheWallAndIsClosed) {
+  WorldDescription description = plain_tube(box_profile(9.0, 6.0, Material::concrete, Material::concrete), {}, 200.0);
+  description.volumes[0].kind = VolumeKind::road;
+  description.volumes[0].equipment.lay_bys = 200.0;  // one, in the middle
+  add_lay_bys(description);
+  ASSERT_EQ(description.volumes.size(), 2U);
+  const World world(description);
+  RayCaster caster(world, {200.0, false, 1});
+  const auto to_the_right = [&](double x) {
+    const Eigen::Vector3d from(x, 0.0, 1.5);
+    const Eigen::Vector3d direction(0.0, -1.0, 0.0);
+    caster.look_from(from);
+    RayPacket packet{};
+    packet.far.fill(-1.0F);
+    const Eigen::Vector3f start = (from - caster.origin()).cast<float>();
+    packet.ox[0] = start.x();
+    packet.oy[0] = start.y();
+    packet.oz[0] = start.z();
+    packet.dy[0] = -1.0F;
+    packet.far[0] = 100.0F;
+    caster.cast(packet);
+    return packet.hit(0) ? caster.exact_range(packet, 0, from, direction) : -1.0;
+  };
+  EXPECT_NEAR(to_the_right(70.0), 4.5, 1e-6);
+  EXPECT_NEAR(to_the_right(100.0), 7.5, 1e-6);
+  EXPECT_NEAR(to_the_right(118.0), 7.5, 1e-6);
+  EXPECT_NEAR(to_the_right(125.0), 4.5, 1e-6);
+  EXPECT_LT(leak_share(world, {{100.0, -5.5, 1.5}, {95.0, 0.0, 1.5}, {119.0, -4.0, 2.0}}, 20000), 2e-5);
 }
 
 }  // namespace
