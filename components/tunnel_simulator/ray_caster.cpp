@@ -81,7 +81,8 @@ struct RayCaster::Impl {
   std::vector<std::shared_ptr<EmbreeSolid>> cache;  // by chunk index, null when far
   std::vector<std::shared_ptr<EmbreeSolid>> movers;
 
-  Impl(const World& w, const Config& c) : world(w), config(c), device(rtcNewDevice("threads=1,set_affinity=0")) {}
+  // No limit for Embree's own threads: with TBB it would hold for the whole process. Builds run in an arena instead.
+  Impl(const World& w, const Config& c) : world(w), config(c), device(rtcNewDevice("set_affinity=0")) {}
   ~Impl() {
     if (top != nullptr) rtcReleaseScene(top);
     cache.clear();
@@ -106,7 +107,9 @@ struct RayCaster::Impl {
 RayCaster::RayCaster(const World& world, const Config& config, std::vector<Mesh> movers)
     : impl_(std::make_unique<Impl>(world, config)) {
   impl_->cache.resize(world.chunks().size());
-  for (Mesh& mesh : movers) impl_->movers.push_back(std::make_shared<EmbreeSolid>(impl_->device, std::move(mesh)));
+  with_threads(config.threads, [&] {
+    for (Mesh& mesh : movers) impl_->movers.push_back(std::make_shared<EmbreeSolid>(impl_->device, std::move(mesh)));
+  });
 }
 
 RayCaster::~RayCaster() = default;
@@ -157,7 +160,7 @@ void RayCaster::look_from(const Eigen::Vector3d& place) {
     d.attach(*mover, static_cast<unsigned>(slots_.size()), 2);
     slots_.push_back(mover.get());
   }
-  rtcCommitScene(d.top);
+  with_threads(d.config.threads, [&] { rtcCommitScene(d.top); });
 }
 
 void RayCaster::move(std::span<const std::array<Pose, 2>> poses) {
@@ -172,7 +175,7 @@ void RayCaster::move(std::span<const std::array<Pose, 2>> poses) {
     d.movers[i]->turn = poses[i][0].linear().cast<float>();
     rtcCommitGeometry(instance);
   }
-  if (!d.movers.empty()) rtcCommitScene(d.top);
+  if (!d.movers.empty()) with_threads(d.config.threads, [&] { rtcCommitScene(d.top); });
 }
 
 void RayCaster::cast(RayPacket& packet) const {
