@@ -75,11 +75,12 @@ Directions DirectionalInformation::analyse(const Matrix6d& hessian, std::span<co
 void DirectionalInformation::attenuate(const Directions& directions, Matrix6d& hessian, Vector6d& gradient) const {
   Vector6d scale;
   for (int i = 0; i < 6; ++i) scale[i] = std::clamp(directions.information[i] / required(i), 0.0, 1.0);
-  const Vector6d along = directions.basis.transpose() * gradient;
-  const Vector6d diagonal = scale.cwiseProduct(directions.curvature.cwiseMax(0.0));
+  // The Hessian may be a later one than that of the directions: with other robust weights, many times stiffer.
+  const Vector6d root = scale.cwiseSqrt();
+  const Matrix6d along = directions.basis.transpose() * hessian * directions.basis;
   const Matrix6d& back = directions.to_coordinates;
-  hessian = back.transpose() * diagonal.asDiagonal() * back;
-  gradient = back.transpose() * scale.cwiseProduct(along);
+  hessian = back.transpose() * (root.asDiagonal() * along * root.asDiagonal()) * back;
+  gradient = back.transpose() * scale.cwiseProduct(directions.basis.transpose() * gradient);
 }
 
 Matrix6d DirectionalInformation::exported(const Directions& directions) {

@@ -31,6 +31,7 @@ void SurfelOdometry::reset() {
   map_.clear();
   sweeps_ = 0;
   last_median_ = 0.0;
+  last_twist_.reset();
 }
 
 // Without a prior from outside: the velocity stays, within what the vehicle's acceleration can change in dt. With one:
@@ -74,11 +75,12 @@ SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
   if (!config_.deskew || !task.times) return twist;
   twist.times = task.times;
   twist.reference_time = task.reference_time;
-  twist.last = task.last;
-  twist.predicted = task.twist;
+  twist.last_middle = twist.middle(task.last, last_twist_.value_or(task.twist));
+  twist.predicted = task.external ? task.twist : last_twist_.value_or(task.twist);
   twist.dt = task.dt <= config_.max_gap_s ? task.dt : 0.0;
-  twist.translation_share = task.external ? 0.0 : config_.surfel.deskew_share;
-  twist.rotation_share = task.external_twist ? 0.0 : config_.surfel.deskew_share;
+  const double share = sweeps_ == 1 ? 1.0 : config_.surfel.deskew_share;  // at first, all that is known of the motion
+  twist.translation_share = task.external ? 0.0 : share;
+  twist.rotation_share = task.external_twist ? 0.0 : share;
   return twist;
 }
 
@@ -105,9 +107,8 @@ SurfelRegistrationResult SurfelOdometry::search_start(const SweepTask& task, con
         registration_.align(surfels_, map_, guess, loose, twist, wide_gate, needed, pool_);
     if (strength(shifted) > required && strength(shifted) > 1.2 * strength(best)) best = shifted;
   }
-  SweepTwist settled = twist;
-  settled.predicted = twist.dt > 0.0 ? Vector6d(se3_log(task.last.inverse() * best.pose) / twist.dt) : twist.predicted;
-  registration_.place(surfels_, best.pose, settled);
+  best.twist = twist.refined(best.pose, best.twist);
+  registration_.place(surfels_, best.pose, twist, best.twist);
   return best;
 }
 
@@ -118,12 +119,13 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
   estimate.scan.registered = static_cast<std::uint32_t>(surfels_.size());
   if (surfels_.size() < config_.min_points) {
     estimate.status = Status::too_few_points;
+    last_twist_.reset();
     return;
   }
   const SweepTwist twist = twist_of(task);
   if (map_.empty()) {
     estimate.status = Status::initialising;
-    registration_.place(surfels_, estimate.pose, twist);
+    registration_.place(surfels_, estimate.pose, twist, twist.predicted);
   } else {
     const bool wide = sweeps_ < wide_gate_sweeps;
     const std::size_t needed = std::max<std::size_t>(30, surfels_.size() / 10);
@@ -148,8 +150,10 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     estimate.scan.planar_ratio = 1.0;
     if (result.matched < needed) {
       estimate.status = Status::lost;
+      last_twist_.reset();
       return;
     }
+    last_twist_ = result.twist;
     last_median_ = result.median_residual;
     estimate.pose = result.pose;
     const Matrix6d information = DirectionalInformation::exported(result.directions);

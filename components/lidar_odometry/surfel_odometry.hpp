@@ -33,8 +33,9 @@ class SurfelOdometry final : public Pipeline {
   SurfelMap map_;
   SurfelRegistration registration_;
   std::vector<Surfel> surfels_;
-  int sweeps_ = 0;            // in the map
-  double last_median_ = 0.0;  // m, residual of the last registration
+  int sweeps_ = 0;                      // in the map
+  double last_median_ = 0.0;            // m, residual of the last registration
+  std::optional<Vector6d> last_twist_;  // that the last sweep was compensated with
 };
 
 }  // namespace adit::lidar_odometry

@@ -18,18 +18,24 @@ constexpr float max_normal_angle_cosine = 0.96f;
 
 }  // namespace
 
-void SurfelRegistration::compensate(std::span<const Surfel> surfels, const SweepTwist& twist, const Pose& estimate,
+Pose SweepTwist::middle(const Pose& pose, const Vector6d& twist) const {
+  if (!times) return pose;
+  return pose * se3_exp((0.5 * (times->first + times->last) - reference_time) * twist);
+}
+
+Vector6d SweepTwist::refined(const Pose& pose, const Vector6d& used) const {
+  if (!(dt > 0.0)) return used;
+  Vector6d twist = predicted;
+  const Vector6d estimated = se3_log(last_middle.inverse() * middle(pose, used)) / dt;
+  twist.head<3>() += translation_share * (estimated - predicted).head<3>();
+  twist.tail<3>() += rotation_share * (estimated - predicted).tail<3>();
+  return twist;
+}
+
+void SurfelRegistration::compensate(std::span<const Surfel> surfels, const SweepTwist& sweep, const Vector6d& twist,
                                     WorkerPool& pool) {
   SweepMotion motion;
-  if (twist.times) {
-    Vector6d xi = twist.predicted;
-    if (twist.dt > 0.0 && (twist.translation_share > 0.0 || twist.rotation_share > 0.0)) {
-      const Vector6d estimated = se3_log(twist.last.inverse() * estimate) / twist.dt;
-      xi.head<3>() += twist.translation_share * (estimated - xi).head<3>();
-      xi.tail<3>() += twist.rotation_share * (estimated - xi).tail<3>();
-    }
-    motion = SweepMotion(xi, *twist.times, twist.reference_time);
-  }
+  if (sweep.times) motion = SweepMotion(twist, *sweep.times, sweep.reference_time);
   compensated_.resize(surfels.size());
   pool.run((surfels.size() + chunk_size - 1) / chunk_size, [&](std::size_t k) {
     const std::size_t end = std::min((k + 1) * chunk_size, surfels.size());
@@ -91,12 +97,16 @@ double SurfelRegistration::median_residual() {
 }
 
 void SurfelRegistration::accumulate(const Pose& pose, std::size_t begin, std::size_t end, double kernel, Sums& sums) {
-  Eigen::Matrix<double, 6, 6> hessian = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  sums.weight = sums.squared = 0.0;
+  // Rows 6 and 7 are padding: columns of whole packets.
+  Eigen::Matrix<float, 8, 6> hessian = Eigen::Matrix<float, 8, 6>::Zero();
+  Eigen::Matrix<float, 8, 1> gradient = Eigen::Matrix<float, 8, 1>::Zero();
+  Eigen::Matrix<float, 8, 1> j = Eigen::Matrix<float, 8, 1>::Zero();
+  float weights = 0.0f;
+  float squares = 0.0f;
   const Eigen::Matrix3f rotation = pose.linear().cast<float>();
-  const double noise2 = config_.residual_sigma * config_.residual_sigma;
-  const double kernel2 = kernel * kernel;
+  const auto noise2 = static_cast<float>(config_.residual_sigma * config_.residual_sigma);
+  const auto kernel2 = static_cast<float>(kernel * kernel);
+  const auto scale2 = static_cast<float>(scale_ * scale_);
   for (std::size_t i = begin; i < end; ++i) {
     Constraint& constraint = constraints_[i];
     constraint.weight = 0.0f;
@@ -106,25 +116,23 @@ void SurfelRegistration::accumulate(const Pose& pose, std::size_t begin, std::si
     const Eigen::Vector3f n_s = rotation * compensated_[i].normal;
     const Eigen::Vector3f& n_m = match.normal;
     const Eigen::Vector3f e = (pose.translation() - match.mean).cast<float>() + y;
-    const float r_m = n_m.dot(e) - match.offset;
-    const float r_s = n_s.dot(e);
-    const double r = 0.5 * static_cast<double>(r_m + r_s);
-    const double k = kernel2 / (kernel2 + r * r);
-    const double weight = k * k / ((noise2 + static_cast<double>(match.variance)) * scale_ * scale_);
-    const auto w = static_cast<float>(weight);
+    const Eigen::Vector3f n = 0.5f * (n_m + n_s);
+    const float r = n.dot(e) - 0.5f * match.offset;
+    const float k = kernel2 / (kernel2 + r * r);
+    const float w = k * k / ((noise2 + match.variance) * scale2);
     constraint = {y, n_m, n_s, w, compensated_[i].cluster};
-    Eigen::Matrix<float, 6, 1> j_m, j_s;
-    j_m << n_m, y.cross(n_m);
-    j_s << n_s, y.cross(n_s);
-    const Eigen::Matrix<float, 6, 1> a = (0.5f * w) * j_m;
-    const Eigen::Matrix<float, 6, 6> half = a * j_s.transpose();
-    hessian += (half + half.transpose()).cast<double>();
-    gradient += (a * r_s + (0.5f * w * r_m) * j_s).cast<double>();
-    sums.weight += weight;
-    sums.squared += weight * r * r;
+    j.head<3>() = n;
+    j.segment<3>(3) = y.cross(n);
+    const Eigen::Matrix<float, 8, 1> a = w * j;
+    for (int column = 0; column < 6; ++column) hessian.col(column) += j[column] * a;
+    gradient += r * a;
+    weights += w;
+    squares += w * r * r;
   }
-  sums.hessian = hessian;
-  sums.gradient = gradient;
+  sums.hessian = hessian.topRows<6>().cast<double>();
+  sums.gradient = gradient.head<6>().cast<double>();
+  sums.weight = static_cast<double>(weights);
+  sums.squared = static_cast<double>(squares);
 }
 
 SurfelRegistration::Sums SurfelRegistration::linearise(const Pose& pose, double kernel, WorkerPool& pool) {
@@ -146,15 +154,17 @@ SurfelRegistration::Sums SurfelRegistration::linearise(const Pose& pose, double 
 }
 
 SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfels, const SurfelMap& map,
-                                                   const Pose& guess, const SurfelPrior& prior, const SweepTwist& twist,
+                                                   const Pose& guess, const SurfelPrior& prior, const SweepTwist& sweep,
                                                    double gate, std::size_t min_matches, WorkerPool& pool) {
   SurfelRegistrationResult result;
   result.pose = guess;
+  result.twist = sweep.predicted;
   Pose pose = guess;
   double moved = 0.0;  // m, by the last association
   for (int outer = 0; outer < usual_associations || (outer < max_associations && moved > settled_step); ++outer) {
     moved = 0.0;
-    compensate(surfels, twist, pose, pool);
+    if (result.associations > 0) result.twist = sweep.refined(pose, result.twist);
+    compensate(surfels, sweep, result.twist, pool);
     associate(map, pose, gate, pool);
     ++result.associations;
     result.median_residual = median_residual();
@@ -189,19 +199,23 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
     }
   }
   result.pose = pose;
-  place(surfels, pose, twist);
+  place(pose);
   return result;
 }
 
-std::span<const MapSurfel> SurfelRegistration::place(std::span<const Surfel> surfels, const Pose& pose,
-                                                     const SweepTwist& twist) {
-  WorkerPool alone(1);
-  compensate(surfels, twist, pose, alone);
-  placed_.resize(surfels.size());
+void SurfelRegistration::place(const Pose& pose) {
+  placed_.resize(compensated_.size());
   const Eigen::Matrix3f rotation = pose.linear().cast<float>();
-  for (std::size_t i = 0; i < surfels.size(); ++i) {
+  for (std::size_t i = 0; i < compensated_.size(); ++i) {
     placed_[i] = {pose * compensated_[i].point.cast<double>(), rotation * compensated_[i].normal};
   }
+}
+
+std::span<const MapSurfel> SurfelRegistration::place(std::span<const Surfel> surfels, const Pose& pose,
+                                                     const SweepTwist& sweep, const Vector6d& twist) {
+  WorkerPool alone(1);
+  compensate(surfels, sweep, twist, alone);
+  place(pose);
   return placed_;
 }
 

@@ -1,4 +1,8 @@
-// Registration of surfels against a SurfelMap: pairwise symmetric point-to-plane residuals, averaged over the cells.
+// Registration of surfels against a SurfelMap: symmetric point-to-plane residuals (the mean of both normals;
+// Rusinkiewicz, "A symmetric objective function for ICP", 2019) with the map's averaged over the cells. They are a sum
+// of squares, so that Gauss-Newton descends; the product of the two residuals is not, and where far surfaces bind a
+// translation to a rotation its curvature is a small difference of large noisy numbers: steps of decimetres to either
+// side.
 #pragma once
 
 #include <optional>
@@ -21,19 +25,28 @@ struct SurfelPrior {
   bool decides_weak_directions = true;
 };
 
-// The motion within the sweep, predicted, and how much of the estimated one replaces it at each association: a share
-// below one, since the full one feeds back on the pose without damping.
+// The motion within the sweep: predicted, and how much of the estimated one replaces it at each association.
+// The estimate is the motion from the middle of the last sweep to the middle of this one. Poses at the ends of sweeps
+// would not do: a wrong twist displaces them, they make the next twist wrong, and where the evidence lies early in the
+// sweep that recursion does not decay. A wrong twist leaves the pose at the time of the evidence, half a sweep before
+// the end on average, as it is.
 struct SweepTwist {
   std::optional<TimeSpan> times;  // nothing: no compensation
   double reference_time = 0.0;    // s after the stamp
-  double dt = 0.0;                // s since the last pose; 0: nothing is learnt from the estimate
-  Pose last = Pose::Identity();   // at which the estimated motion begins
+  double dt = 0.0;                // s since the last sweep; 0: nothing is learnt from the estimate
+  Pose last_middle = Pose::Identity();
   Vector6d predicted = Vector6d::Zero();
   double translation_share = 0.0, rotation_share = 0.0;
+
+  // The pose in the middle of a sweep that ends at `pose` and moves with `twist`.
+  Pose middle(const Pose& pose, const Vector6d& twist) const;
+  // The twist to compensate with, by a pose that was found with `used`.
+  Vector6d refined(const Pose& pose, const Vector6d& used) const;
 };
 
 struct SurfelRegistrationResult {
   Pose pose = Pose::Identity();
+  Vector6d twist = Vector6d::Zero();     // that the sweep was compensated with
   Directions directions;                 // in map axes
   Vector6d gradient = Vector6d::Zero();  // of the match alone, at the result, map axes
   std::size_t matched = 0;
@@ -48,13 +61,14 @@ class SurfelRegistration {
 
   // gate: m, largest residual; fewer matches than min_matches end it at the guess with matched as counted.
   SurfelRegistrationResult align(std::span<const Surfel> surfels, const SurfelMap& map, const Pose& guess,
-                                 const SurfelPrior& prior, const SweepTwist& twist, double gate,
+                                 const SurfelPrior& prior, const SweepTwist& sweep, double gate,
                                  std::size_t min_matches, WorkerPool& pool);
 
   // The surfels of the last align() in map coordinates, at its result and with its motion.
   std::span<const MapSurfel> placed() const { return placed_; }
   // The same for a sweep that was not aligned.
-  std::span<const MapSurfel> place(std::span<const Surfel> surfels, const Pose& pose, const SweepTwist& twist);
+  std::span<const MapSurfel> place(std::span<const Surfel> surfels, const Pose& pose, const SweepTwist& sweep,
+                                   const Vector6d& twist);
 
  private:
   static constexpr std::size_t chunk_size = 256;
@@ -64,7 +78,8 @@ class SurfelRegistration {
     double weight, squared;
   };
 
-  void compensate(std::span<const Surfel> surfels, const SweepTwist& twist, const Pose& estimate, WorkerPool& pool);
+  void compensate(std::span<const Surfel> surfels, const SweepTwist& sweep, const Vector6d& twist, WorkerPool& pool);
+  void place(const Pose& pose);
   void associate(const SurfelMap& map, const Pose& pose, double gate, WorkerPool& pool);
   double median_residual();
   void accumulate(const Pose& pose, std::size_t begin, std::size_t end, double kernel, Sums& sums);

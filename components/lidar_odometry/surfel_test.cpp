@@ -191,20 +191,30 @@ TEST(SurfelRegistration, FindsADisplacedPoseAnywhere) {
   EXPECT_LT((errors[0] - errors[1]).head<3>().norm(), 0.001);
 }
 
-// Evidence 1.6: replacing the whole compensation by the estimate at each association feeds back without damping.
-// Axially uniform model: the error of the pose obeys e_k (1 - s/2) = (1 - 2s)/2 e_{k-1} - (1 - s)/2 e_{k-2}.
-TEST(SweepTwist, ADampedShareIsStable) {
-  const auto largest_root = [](double s) {
-    const double a = 1.0 - 0.5 * s;
-    const double b = -(1.0 - 2.0 * s) / 2.0;
-    const double c = (1.0 - s) / 2.0;
-    const double d = b * b - 4.0 * a * c;
-    if (d < 0.0) return std::sqrt(c / a);
-    return std::max(std::abs(-b + std::sqrt(d)), std::abs(-b - std::sqrt(d))) / (2.0 * a);
-  };
-  EXPECT_NEAR(largest_root(1.0), 1.0, 1e-12);
-  EXPECT_NEAR(largest_root(0.0), 0.71, 0.01);
-  EXPECT_LT(largest_root(SurfelConfig{}.deskew_share), 0.5);
+// Whenever in the sweep the evidence of the position lies: an error of the twist decays. The pose at the end is off by
+// what the wrong twist makes of the time from the evidence to the end.
+TEST(SweepTwist, ErrorsDecayWhereverTheEvidenceLies) {
+  constexpr double period = 0.1, speed = 5.0;
+  for (const double to_end : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+    Vector6d used = Vector6d::Zero();
+    Pose last = Pose::Identity();
+    for (int sweep = 1; sweep <= 20; ++sweep) {
+      SweepTwist twist;
+      twist.times = TimeSpan{0.0, period};
+      twist.reference_time = twist.dt = period;
+      twist.predicted = used;
+      twist.last_middle = twist.middle(last, used);
+      twist.translation_share = twist.rotation_share = SurfelConfig{}.deskew_share;
+      Pose pose = Pose::Identity();
+      for (int association = 0; association < 3; ++association) {
+        if (association > 0) used = twist.refined(pose, used);
+        pose.translation().x() = speed * period * sweep + to_end * period * (used[0] - speed);
+      }
+      last = pose;
+    }
+    EXPECT_NEAR(used[0], speed, 1e-3) << to_end;
+    EXPECT_NEAR(last.translation().x(), 20 * period * speed, 1e-4) << to_end;
+  }
 }
 
 }  // namespace
