@@ -40,6 +40,16 @@ class LidarOdometryComponent final : public Component {
   Param<bool> deskew_{*this, "deskew", true, "compensate the motion within the sweep"};
   Param<std::int64_t> threads_{*this, "threads", 1, Range{1.0, 16.0}, "the result does not depend on it"};
   Param<std::string> odom_frame_{*this, "odom_frame", std::string("odom"), "frame of the published poses"};
+  Param<double> max_acceleration_{*this,
+                                  "max_acceleration",
+                                  3.0,
+                                  Unit::metre_per_second_squared,
+                                  Range{0.1, 1000.0},
+                                  "of the vehicle; too large is safe, too small lags"};
+  Param<double> max_angular_acceleration_{*this, "max_angular_acceleration", 1.0, Range{0.1, 1000.0},
+                                          "rad/s^2; a walking robot: 20"};
+  Param<double> deskew_share_{*this, "deskew_share", 0.7, Range{0.0, 1.0},
+                              "of the estimated motion in the compensation; a walking robot: 0.5"};
   Param<bool> use_prior_{*this, "use_prior", false, "use the odometry that arrives at `prior`"};
   Param<PriorKind> prior_kind_{
       *this, "prior_kind", PriorKind::guess,
@@ -119,6 +129,9 @@ Result<void> LidarOdometryComponent::configure() {
   config.min_range = min_range_;
   config.max_range = max_range_;
   config.deskew = deskew_;
+  config.surfel.max_acceleration = max_acceleration_;
+  config.surfel.max_angular_acceleration = max_angular_acceleration_;
+  config.surfel.deskew_share = deskew_share_;
   config.threads = static_cast<int>(threads_.value());
   if (voxel_size_ > 0.0) config.kiss.voxel_size = config.genz.voxel_size = voxel_size_;
   if (Result<void> valid = lidar_odometry::check(config); !valid) return valid;

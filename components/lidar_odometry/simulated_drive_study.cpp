@@ -1,5 +1,6 @@
 // Runs the odometry over a folder of the tunnel simulator (`simulate_folder`) and prints its figures; a study, no test.
 //   lidar_odometry_drive FOLDER [mode=default] [first=0] [scans=N] [every=20] [prior=PERCENT] [organised=1] [tum=FILE]
+//   [from=0: sweeps before this one are not counted in shares and largest errors]
 // prior: wheel and gyroscope with this scale error of the way. organised=0: the points as the folder has them.
 #include <algorithm>
 #include <cmath>
@@ -74,6 +75,7 @@ struct Figures {
   std::vector<Pose> truth, estimate;
   std::vector<double> ms, nees;
   double solves = 0.0, most_solves = 0.0, lateral = 0.0, vertical = 0.0, yaw = 0.0, tilt = 0.0, axial = 0.0;
+  std::size_t from = 0;
   int flagged = 0, flagged_rotation = 0, count = 0, unregistered = 0, capped = 0;
 };
 
@@ -86,6 +88,7 @@ void note(Figures& f, const Estimate& e, const Pose& truth, double ms, bool prin
   const std::size_t n = f.truth.size();
   const Vector6d step = se3_log((f.truth[n - 2].inverse() * truth).inverse() * (f.estimate[n - 2].inverse() * e.pose));
   const Pose total = (first.inverse() * truth).inverse() * (f.estimate.front().inverse() * e.pose);
+  if (n <= f.from) return;
   ++f.count;
   f.solves += e.scan.solves;
   f.most_solves = std::max<double>(f.most_solves, e.scan.solves);
@@ -179,6 +182,7 @@ int main(int argc, char** argv) {
   }
   LidarOdometry odometry(config);
   Figures figures;
+  figures.from = static_cast<std::size_t>(number("from", 0.0));
   Trajectory out;
   SweepReader reader(folder);
   for (std::size_t i = 0; i < truth->size() && i < first + scans; ++i) {

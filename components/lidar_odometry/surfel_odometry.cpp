@@ -32,6 +32,7 @@ void SurfelOdometry::reset() {
   sweeps_ = 0;
   last_median_ = 0.0;
   last_twist_.reset();
+  twist_change2_.setZero();
 }
 
 // Without a prior from outside: the velocity stays, within what the vehicle's acceleration can change in dt. With one:
@@ -75,6 +76,7 @@ SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
   if (!config_.deskew || !task.times) return twist;
   twist.times = task.times;
   twist.reference_time = task.reference_time;
+  twist.last = task.last;
   twist.last_middle = twist.middle(task.last, last_twist_.value_or(task.twist));
   twist.predicted = task.external ? task.twist : last_twist_.value_or(task.twist);
   twist.dt = task.dt <= config_.max_gap_s ? task.dt : 0.0;
@@ -82,6 +84,24 @@ SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
   twist.translation_share = task.external ? 0.0 : share;
   twist.rotation_share = task.external_twist ? 0.0 : share;
   return twist;
+}
+
+void SurfelOdometry::note_twist(const Vector6d& twist) {
+  if (last_twist_) twist_change2_ += 0.2 * ((twist - *last_twist_).cwiseAbs2() - twist_change2_);
+  last_twist_ = twist;
+}
+
+// A sweep is compensated with one twist; what the motion changes within it displaces the pose. By how much the twist
+// usually changes from sweep to sweep tells its variance F: information I becomes (1 - I (I + F^-1)^-1) I, the inverse
+// of I^-1 + F, also of directions that the match does not know. Returns the factor.
+Matrix6d SurfelOdometry::widened(const Matrix6d& match, double duration) const {
+  constexpr double least_translation = 5e-4, least_rotation = 5e-5;  // m, rad
+  Vector6d variance = 0.25 * duration * duration * twist_change2_;
+  variance.head<3>().array() += least_translation * least_translation;
+  variance.tail<3>().array() += least_rotation * least_rotation;
+  Matrix6d sum = match;
+  sum.diagonal() += variance.cwiseInverse();
+  return Matrix6d::Identity() - sum.ldlt().solve(match).transpose();
 }
 
 // The second sweep without any knowledge of the velocity: if the match at rest does not convince, others along the
@@ -153,15 +173,18 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
       last_twist_.reset();
       return;
     }
-    last_twist_ = result.twist;
+    note_twist(result.twist);
     last_median_ = result.median_residual;
     estimate.pose = result.pose;
-    const Matrix6d information = DirectionalInformation::exported(result.directions);
     Matrix6d turn = Matrix6d::Zero();
     turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = result.pose.linear();
-    estimate.information = turn.transpose() * information * turn;
-    estimate.gradient =
+    const Matrix6d match = turn.transpose() * DirectionalInformation::exported(result.directions) * turn;
+    const Vector6d slope =
         turn.transpose() * DirectionalInformation::exported_gradient(result.directions, result.gradient);
+    const Matrix6d share = widened(match, twist.times ? twist.times->last - twist.times->first : 0.0);
+    estimate.information = share * match;
+    estimate.information = 0.5 * (estimate.information + estimate.information.transpose().eval());
+    estimate.gradient = share * slope;
     estimate.localizability = localizability(result.directions, result.pose.linear());
     estimate.status = estimate.localizability.unobservable() > 0 ? Status::degenerate : Status::ok;
   }

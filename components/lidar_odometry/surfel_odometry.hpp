@@ -23,6 +23,8 @@ class SurfelOdometry final : public Pipeline {
  private:
   SurfelPrior prior_of(const SweepTask& task) const;
   SweepTwist twist_of(const SweepTask& task) const;
+  void note_twist(const Vector6d& twist);
+  Matrix6d widened(const Matrix6d& match, double duration) const;
   SurfelRegistrationResult search_start(const SweepTask& task, const SurfelPrior& prior, const SweepTwist& twist,
                                         std::size_t needed, const SurfelRegistrationResult& at_rest);
 
@@ -33,9 +35,10 @@ class SurfelOdometry final : public Pipeline {
   SurfelMap map_;
   SurfelRegistration registration_;
   std::vector<Surfel> surfels_;
-  int sweeps_ = 0;                      // in the map
-  double last_median_ = 0.0;            // m, residual of the last registration
-  std::optional<Vector6d> last_twist_;  // that the last sweep was compensated with
+  int sweeps_ = 0;                             // in the map
+  double last_median_ = 0.0;                   // m, residual of the last registration
+  std::optional<Vector6d> last_twist_;         // that the last sweep was compensated with
+  Vector6d twist_change2_ = Vector6d::Zero();  // mean square of its change from sweep to sweep
 };
 
 }  // namespace adit::lidar_odometry

@@ -11,7 +11,7 @@ namespace {
 constexpr int usual_associations = 3;
 constexpr int max_associations = 10;     // while the pose still moves by more than settled_step
 constexpr double settled_step = 2e-2;    // m
-constexpr int max_solves = 3;            // for each association
+constexpr int max_solves = 3;            // for each of the first two associations; one less for later ones
 constexpr double converged_step = 5e-4;  // m
 constexpr double mean_range = 10.0;      // m: turns radians into metres for the stop test
 constexpr float max_normal_angle_cosine = 0.96f;
@@ -26,9 +26,10 @@ Pose SweepTwist::middle(const Pose& pose, const Vector6d& twist) const {
 Vector6d SweepTwist::refined(const Pose& pose, const Vector6d& used) const {
   if (!(dt > 0.0)) return used;
   Vector6d twist = predicted;
-  const Vector6d estimated = se3_log(last_middle.inverse() * middle(pose, used)) / dt;
-  twist.head<3>() += translation_share * (estimated - predicted).head<3>();
-  twist.tail<3>() += rotation_share * (estimated - predicted).tail<3>();
+  const Eigen::Vector3d velocity = se3_log(last_middle.inverse() * middle(pose, used)).head<3>() / dt;
+  const Eigen::Vector3d rate = so3_log(last.linear().transpose() * pose.linear()) / dt;
+  twist.head<3>() += translation_share * (velocity - predicted.head<3>());
+  twist.tail<3>() += rotation_share * (rate - predicted.tail<3>());
   return twist;
 }
 
@@ -173,7 +174,7 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
     const double deviation = 1.4826 * result.median_residual;
     const double kernel = std::max(config_.residual_sigma, 3.0 * result.median_residual);
     scale_ = std::max(deviation / config_.residual_sigma, 0.5);
-    for (int inner = 0; inner < max_solves; ++inner) {
+    for (int inner = 0; inner < (outer < 2 ? max_solves : max_solves - 1); ++inner) {
       Sums sums = linearise(pose, kernel, pool);
       result.rms_residual = std::sqrt(sums.squared / std::max(sums.weight, 1e-12));
       if (inner == 0) result.directions = information_.analyse(sums.hessian, constraints_);

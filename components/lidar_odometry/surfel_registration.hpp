@@ -26,15 +26,17 @@ struct SurfelPrior {
 };
 
 // The motion within the sweep: predicted, and how much of the estimated one replaces it at each association.
-// The estimate is the motion from the middle of the last sweep to the middle of this one. Poses at the ends of sweeps
-// would not do: a wrong twist displaces them, they make the next twist wrong, and where the evidence lies early in the
-// sweep that recursion does not decay. A wrong twist leaves the pose at the time of the evidence, half a sweep before
-// the end on average, as it is.
+// The estimated translation is that from the middle of the last sweep to the middle of this one. Poses at the ends of
+// sweeps would feed back: a wrong velocity displaces them, they make the next velocity wrong, and where the evidence
+// lies early in the sweep that recursion does not decay. A wrong velocity leaves the pose at the time of the evidence,
+// half a sweep before the end on average, as it is. Rotations, whose evidence is all around, are taken from end to end:
+// without delay.
 struct SweepTwist {
-  std::optional<TimeSpan> times;  // nothing: no compensation
-  double reference_time = 0.0;    // s after the stamp
-  double dt = 0.0;                // s since the last sweep; 0: nothing is learnt from the estimate
-  Pose last_middle = Pose::Identity();
+  std::optional<TimeSpan> times;        // nothing: no compensation
+  double reference_time = 0.0;          // s after the stamp
+  double dt = 0.0;                      // s since the last sweep; 0: nothing is learnt from the estimate
+  Pose last = Pose::Identity();         // at the end of the last sweep
+  Pose last_middle = Pose::Identity();  // in its middle
   Vector6d predicted = Vector6d::Zero();
   double translation_share = 0.0, rotation_share = 0.0;
 

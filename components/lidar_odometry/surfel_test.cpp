@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "components/lidar_odometry/directional_information.hpp"
 #include "components/lidar_odometry/range_image.hpp"
 #include "components/lidar_odometry/surfel_map.hpp"
 #include "components/lidar_odometry/surfel_registration.hpp"
@@ -179,7 +180,7 @@ TEST(SurfelRegistration, FindsADisplacedPoseAnywhere) {
     SurfelMap map(config.surfel.cell_size, 80.0, 1 << 15);
     SurfelRegistration registration(config.surfel);
     WorkerPool pool(1);
-    map.add(registration.place(first, base, {}), base.translation());
+    map.add(registration.place(first, base, {}, Vector6d::Zero()), base.translation());
     SurfelPrior loose;
     loose.information = 1e-3 * Matrix6d::Identity();
     const auto result = registration.align(second, map, base * se3_exp(offset), loose, {}, 0.5, 30, pool);
@@ -189,6 +190,34 @@ TEST(SurfelRegistration, FindsADisplacedPoseAnywhere) {
     for (const bool observable : result.directions.observable) EXPECT_TRUE(observable);
   }
   EXPECT_LT((errors[0] - errors[1]).head<3>().norm(), 0.001);
+}
+
+// Robust weights change from solve to solve, the directions do not: a step needs the Hessian of its own weights. With
+// the first one's, 50 times too soft, Gauss-Newton went 50 times too far.
+TEST(DirectionalInformation, AttenuatesTheHessianItIsGiven) {
+  std::vector<Constraint> constraints;
+  Matrix6d hessian = Matrix6d::Zero();
+  for (int i = 0; i < 600; ++i) {
+    Constraint c;
+    c.map_normal = c.source_normal = Eigen::Vector3f::Unit(i % 3);
+    c.lever = Eigen::Vector3f(static_cast<float>(i % 7) - 3.0f, static_cast<float>(i % 11) - 5.0f,
+                              static_cast<float>(i % 13) - 6.0f);
+    c.weight = 4000.0f;
+    c.cluster = static_cast<std::uint16_t>(i);
+    Vector6d j;
+    j << c.map_normal.cast<double>(), c.lever.cross(c.map_normal).cast<double>();
+    hessian += 4000.0 * j * j.transpose();
+    constraints.push_back(c);
+  }
+  DirectionalInformation analysis{SurfelConfig{}};
+  const Directions directions = analysis.analyse(hessian, constraints);
+  for (const bool observable : directions.observable) ASSERT_TRUE(observable);
+  const Matrix6d stiffer = 50.0 * hessian;
+  Matrix6d attenuated = stiffer;
+  Vector6d gradient = Vector6d::Ones();
+  analysis.attenuate(directions, attenuated, gradient);
+  EXPECT_LT((attenuated - stiffer).norm(), 1e-9 * stiffer.norm());
+  EXPECT_LT((gradient - Vector6d::Ones()).norm(), 1e-9);
 }
 
 // Whenever in the sweep the evidence of the position lies: an error of the twist decays. The pose at the end is off by
@@ -203,6 +232,7 @@ TEST(SweepTwist, ErrorsDecayWhereverTheEvidenceLies) {
       twist.times = TimeSpan{0.0, period};
       twist.reference_time = twist.dt = period;
       twist.predicted = used;
+      twist.last = last;
       twist.last_middle = twist.middle(last, used);
       twist.translation_share = twist.rotation_share = SurfelConfig{}.deskew_share;
       Pose pose = Pose::Identity();
