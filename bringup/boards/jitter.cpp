@@ -31,32 +31,29 @@ using Microseconds = std::chrono::duration<double, std::micro>;
 constexpr auto period = std::chrono::milliseconds(10);
 constexpr std::size_t payload = 1024;
 
-// Sends at each tick of its timer and takes the time until the message is back.
-class Probe final : public Component {
- public:
-  Probe() {
-    instance = this;
-    lateness.reserve(1 << 20);
-    round_trip.reserve(1 << 20);
-  }
-  static inline Probe* instance = nullptr;
+// What the probe has seen; outlives it.
+struct Results {
   std::vector<double> lateness;    // [us]
   std::vector<double> round_trip;  // [us]
   std::uint64_t missed = 0;
   std::uint64_t sent = 0;
+};
+Results results;
 
- private:
+// Sends at each tick of its timer and takes the time until the message is back.
+class Probe final : public Component {
   void tick(const TimerTick& tick) {
-    missed += tick.missed;
-    lateness.push_back(Microseconds(tick.now - tick.scheduled).count());
+    results.missed += tick.missed;
+    results.lateness.push_back(Microseconds(tick.now - tick.scheduled).count());
     Loan<Image> image = out_.loan();
     image->data.resize(payload);
-    image->step = static_cast<std::uint32_t>(++sent);
+    image->step = static_cast<std::uint32_t>(++results.sent);
     sent_at_ = Steady::now();
     out_.publish(std::move(image));
   }
   void back(const Image& image) {
-    if (image.step == sent) round_trip.push_back(Microseconds(Steady::now() - sent_at_).count());
+    if (image.step != results.sent) return;
+    results.round_trip.push_back(Microseconds(Steady::now() - sent_at_).count());
   }
 
   Steady::time_point sent_at_;
@@ -132,6 +129,8 @@ void print(const char* name, std::vector<double> values, bool json) {
 }
 
 int measure(const Settings& settings) {
+  results.lateness.reserve(static_cast<std::size_t>(settings.seconds * 100) + 100);
+  results.round_trip.reserve(results.lateness.capacity());
   const pid_t echo = ::fork();
   if (echo == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -153,19 +152,18 @@ int measure(const Settings& settings) {
     std::fprintf(stderr, "adit_jitter: %s\n", served.error().message.c_str());
     return 1;
   }
-  const Probe& probe = *Probe::instance;
   if (settings.json)
-    std::printf("{\"missed_ticks\": %llu, \"sent\": %llu, ", static_cast<unsigned long long>(probe.missed),
-                static_cast<unsigned long long>(probe.sent));
-  print(settings.json ? "timer_100hz" : "100 Hz timer", probe.lateness, settings.json);
+    std::printf("{\"missed_ticks\": %llu, \"sent\": %llu, ", static_cast<unsigned long long>(results.missed),
+                static_cast<unsigned long long>(results.sent));
+  print(settings.json ? "timer_100hz" : "100 Hz timer", results.lateness, settings.json);
   if (settings.json) std::printf(", ");
-  print(settings.json ? "loop_1kb" : "1 KB there, back", probe.round_trip, settings.json);
+  print(settings.json ? "loop_1kb" : "1 KB there, back", results.round_trip, settings.json);
   if (settings.json)
     std::printf("}\n");
   else
-    std::printf("%llu ticks missed, %zu of %llu answers\n", static_cast<unsigned long long>(probe.missed),
-                probe.round_trip.size(), static_cast<unsigned long long>(probe.sent));
-  return probe.round_trip.empty() ? 1 : 0;
+    std::printf("%llu ticks missed, %zu of %llu answers\n", static_cast<unsigned long long>(results.missed),
+                results.round_trip.size(), static_cast<unsigned long long>(results.sent));
+  return results.round_trip.empty() ? 1 : 0;
 }
 
 }  // namespace
