@@ -39,8 +39,8 @@ int main(int argc, char** argv) {
   participant_qos.transport().use_builtin_transports = false;
   participant_qos.transport().user_transports = {memory, udp};
   auto& builtin = participant_qos.wire_protocol().builtin;
-  builtin.discovery_config.initial_announcements = {5, {0, 2'000'000}};  // as ours
-  eprosima::fastrtps::rtps::Locator_t host;                               // unicast, as ours
+  builtin.discovery_config.initial_announcements = {5, {0, 10'000'000}};
+  eprosima::fastrtps::rtps::Locator_t host;  // unicast, as ours
   host.kind = LOCATOR_KIND_UDPv4;
   eprosima::fastrtps::rtps::IPLocator::setIPv4(host, "127.0.0.1");
   builtin.initialPeersList.push_back(host);
