@@ -1,5 +1,6 @@
 // Runs the odometry over the shared recordings and prints its figures; for studies, not a test.
 //   lidar_odometry_study synthetic kiss|genz|default raw|deskew [scans]
+//   lidar_odometry_study shuttle kiss|genz|default SWEEPS [START_X]
 //   lidar_odometry_study spread kiss|genz|default raw|deskew [seeds]
 //   lidar_odometry_study scene kiss|genz|default hall|smooth|furnished|portal SPEED SCANS [none|PRIOR_PERCENT] [rings
 //   columns] lidar_odometry_study subt kiss|genz|default [max_range] [voxel]
@@ -156,6 +157,46 @@ int scene(Config config, const std::string& name, double speed, int scans, doubl
   return 0;
 }
 
+// To and fro over the same 41 sweeps of a furnished tunnel, START_X metres from the origin: does a sweep cost the same
+// after hours, and far away?
+int shuttle(const Config& config, int sweeps, double start) {
+  ScannerModel model;
+  model.rings = 128;
+  model.columns = 1024;
+  model.times = false;
+  std::vector<RecordedSweep> recorded;
+  const auto way = [](int k) { return 5.0 * (1.0 - std::cos(M_PI * k / 40.0)); };
+  for (int k = 0; k <= 40; ++k) {
+    Pose pose = Pose::Identity();
+    pose.translation().x() = way(k);
+    recorded.push_back(scan(furnished_tunnel(-40.0, 60.0), model, pose, Vector6d::Zero(), 0, static_cast<unsigned>(k)));
+  }
+  LidarOdometry odometry(config);
+  Prior first;
+  first.kind = Prior::Kind::absolute;
+  first.pose.translation().x() = start;
+  std::vector<double> times;
+  double largest = 0.0;
+  for (int i = 0; i < sweeps; ++i) {
+    const int k = i % 80 <= 40 ? i % 80 : 80 - i % 80;
+    Cloud cloud = recorded[static_cast<std::size_t>(k)].cloud();
+    cloud.stamp_ns = 100'000'000LL * i;
+    const std::clock_t begin = std::clock();
+    const Estimate& e = odometry.process(cloud, i == 0 ? &first : nullptr);
+    times.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+    largest = std::max(largest, (e.pose.translation() - Eigen::Vector3d(start + way(k), 0.0, 0.0)).norm());
+  }
+  const auto median = [&](std::size_t from, std::size_t to) {
+    std::vector<double> part(times.begin() + static_cast<std::ptrdiff_t>(from),
+                             times.begin() + static_cast<std::ptrdiff_t>(to));
+    std::nth_element(part.begin(), part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2), part.end());
+    return part[part.size() / 2];
+  };
+  std::printf("median ms of sweeps 100-200 %.2f, of the last 100 %.2f; largest error %.3f m\n", median(100, 200),
+              median(times.size() - 100, times.size()), largest);
+  return 0;
+}
+
 // A recording of a sensor at rest: every step is an error.
 int standing(const Config& config, const std::string& name, std::int64_t unit) {
   LidarOdometry odometry(config);
@@ -267,6 +308,7 @@ int main(int argc, char** argv) {
   const auto arg = [&](int i) { return std::string(argc > i ? argv[i] : ""); };
   config.mode = mode_from_string(arg(2)).value_or(Mode::kiss);
   if (arg(1) == "synthetic") return synthetic(config, arg(3) != "raw");
+  if (arg(1) == "shuttle") return shuttle(config, std::max(400, std::atoi(arg(3).c_str())), std::atof(arg(4).c_str()));
   if (arg(1) == "spread") return spread(config, arg(3) != "raw", argc > 4 ? std::atoi(argv[4]) : 10);
   if (arg(1) == "scene") {
     ScannerModel model;
