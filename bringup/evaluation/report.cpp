@@ -98,6 +98,7 @@ Plot map_with_route(const Trajectory& truth, const std::vector<std::vector<Eigen
   plot.y_label = "y [m]";
   plot.equal_axes = true;
   plot.background = map;
+  plot.whole_background = true;
   plot.first_is_truth = true;
   plot.height_px = 520;
   plot.lines.push_back({"route driven", {}});

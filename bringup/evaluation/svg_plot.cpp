@@ -41,6 +41,14 @@ struct Frame {
         y.add(p.y());
       }
     }
+    for (const std::vector<Eigen::Vector2d>& points : plot.background) {
+      if (!plot.whole_background) break;
+      for (const Eigen::Vector2d& p : points) {
+        if (!p.allFinite()) continue;
+        x.add(p.x());
+        y.add(p.y());
+      }
+    }
     x.pad();
     y.pad();
     x_per_px = (x.high - x.low) / width;
@@ -185,8 +193,8 @@ std::string render_svg(const Plot& plot) {
                                      : std::string("stroke=\"") + kColours[colour] + "\" stroke-width=\"1.5\"";
     out += path(plot.lines[i], frame, stroke);
     out += format("<line x1=\"%.1f\" x2=\"%.1f\" y1=\"26\" y2=\"26\" ", legend_x, legend_x + 18) + stroke + "/>\n";
-    out += text_at(legend_x + 22, 30, "", plot.lines[i].label);
-    legend_x += 40.0 + 7.0 * static_cast<double>(plot.lines[i].label.size());
+    out += text_at(legend_x + 21, 30, "font-size=\"11\"", plot.lines[i].label);
+    legend_x += 29.0 + 6.0 * static_cast<double>(plot.lines[i].label.size());
   }
   return out + "</svg>\n";
 }

@@ -21,7 +21,8 @@ struct Plot {
   std::string title, x_label, y_label;
   std::vector<PlotLine> lines;                           // the first one is drawn dark and wide: the truth
   std::vector<PlotSpan> shaded;                          // outages
-  std::vector<std::vector<Eigen::Vector2d>> background;  // thin grey lines without label (walls); they set no bounds
+  std::vector<std::vector<Eigen::Vector2d>> background;  // thin grey lines without label (walls)
+  bool whole_background = false;                         // all of it is shown; else only what lies within the lines
   bool first_is_truth = false;
   bool equal_axes = false;  // one metre is as long on both axes (top views)
   int width_px = 900, height_px = 380;
