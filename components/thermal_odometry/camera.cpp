@@ -8,7 +8,16 @@ namespace adit::thermal_odometry {
 
 Pinhole Pinhole::at_level(int level) const {
   const double scale = 1.0 / static_cast<double>(1 << level);
-  return {fx * scale, fy * scale, (cx + 0.5) * scale - 0.5, (cy + 0.5) * scale - 0.5};
+  return {fx * scale,
+          fy * scale,
+          (cx + 0.5) * scale - 0.5,
+          (cy + 0.5) * scale - 0.5,
+          row_time / scale,
+          (middle_row + 0.5) * scale - 0.5};
+}
+
+Pinhole pinhole_of(const CameraModel& model) {
+  return {model.fx, model.fy, model.cx, model.cy, model.row_time, 0.5 * (model.height - 1)};
 }
 
 Result<void> check(const CameraModel& model) {
@@ -21,6 +30,9 @@ Result<void> check(const CameraModel& model) {
   }
   const bool centre_inside = model.cx > 0.0 && model.cy > 0.0 && model.cx < model.width && model.cy < model.height;
   if (!centre_inside) return Error{ErrorCode::invalid_argument, "camera principal point is outside the image"};
+  if (!(std::abs(model.row_time) < 1e-3)) {
+    return Error{ErrorCode::invalid_argument, "row_time is not a number of seconds below 1 ms"};
+  }
   for (double coefficient : model.coefficients) {
     if (!std::isfinite(coefficient)) return Error{ErrorCode::invalid_argument, "distortion coefficient is not finite"};
   }

@@ -16,9 +16,13 @@ struct Pinhole {
   double fy = 0.0;
   double cx = 0.0;
   double cy = 0.0;
+  double row_time = 0.0;  // s from row to row, counted from middle_row
+  double middle_row = 0.0;
   // Intrinsics `level` halvings down; the half-pixel shift belongs to pixel centres at integers.
   Pinhole at_level(int level) const;
 };
+
+Pinhole pinhole_of(const CameraModel& model);
 
 // Says what is wrong with a calibration: size, focal lengths, non-finite values.
 Result<void> check(const CameraModel& model);

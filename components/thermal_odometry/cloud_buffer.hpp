@@ -39,7 +39,8 @@ class CloudBuffer {
   // Copies; points that are not finite are dropped, those beyond the capacity are left out evenly.
   void add(const DepthPoints& cloud);
   // Points in the camera frame at `stamp_ns`, from the newest cloud whose last point is at most max_age older and 50 ms
-  // newer. Without a history both instants are taken as the same place. Empty: no such cloud. Valid until the next call.
+  // newer. Without a history both instants are taken as the same place. Empty: no such cloud. Valid until the next
+  // call.
   std::span<const Eigen::Vector3f> at(std::int64_t stamp_ns, const PoseHistory& history);
 
  private:

@@ -20,13 +20,24 @@ DepthAnchor::DepthAnchor(const Pinhole& camera, int width, int height, std::size
   nearest_.assign(static_cast<std::size_t>(columns_ * rows_), 0.0F);
 }
 
-void DepthAnchor::project(std::span<const Eigen::Vector3f> points) {
+void DepthAnchor::project(std::span<const Eigen::Vector3f> points, const Vector6d& rate) {
   projected_.clear();
   const auto fx = static_cast<float>(camera_.fx);
   const auto fy = static_cast<float>(camera_.fy);
   const auto cx = static_cast<float>(camera_.cx);
   const auto cy = static_cast<float>(camera_.cy);
-  for (const Eigen::Vector3f& point : points) {
+  const bool rolling = camera_.row_time != 0.0;
+  const auto row_time = static_cast<float>(camera_.row_time);
+  const auto middle_row = static_cast<float>(camera_.middle_row);
+  const Eigen::Vector3f velocity = rate.head<3>().cast<float>();
+  const Eigen::Vector3f spin = rate.tail<3>().cast<float>();
+  for (Eigen::Vector3f point : points) {
+    if (rolling && point.z() > 0.5F * config_.min_range) {
+      const float row = fy * point.y() / point.z() + cy;
+      if (std::abs(row - middle_row) < static_cast<float>(height_)) {
+        point += row_time * (row - middle_row) * (spin.cross(point) + velocity);
+      }
+    }
     if (!(point.z() > config_.min_range) || !(point.z() < config_.max_range)) continue;
     const float inverse = 1.0F / point.z();
     const float u = fx * point.x() * inverse + cx;

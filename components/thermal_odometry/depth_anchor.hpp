@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "components/geometry/se3.hpp"
 #include "components/thermal_odometry/camera.hpp"
 
 namespace adit::thermal_odometry {
@@ -34,7 +35,8 @@ class DepthAnchor {
   };
   DepthAnchor(const Pinhole& camera, int width, int height, std::size_t capacity, const Config& config);
   // Points in the camera frame at the image's time [m]; those beyond the capacity are left out evenly.
-  void project(std::span<const Eigen::Vector3f> points);
+  // `rate`: of the camera, d/dt T_cw = rate T_cw, for a rolling readout.
+  void project(std::span<const Eigen::Vector3f> points, const Vector6d& rate = Vector6d::Zero());
   // Depth of one pixel of the image last projected into; nothing without enough support.
   std::optional<AnchorDepth> depth_at(float u, float v) const;
   std::size_t visible_points() const { return sorted_.size(); }

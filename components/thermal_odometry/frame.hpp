@@ -37,6 +37,7 @@ struct CameraModel {
   double cy = 0.0;
   Distortion distortion = Distortion::none;
   std::array<double, 8> coefficients{};  // k1 k2 p1 p2 k3 [k4 k5 k6]
+  double row_time = 0.0;                 // s from row to row of a rolling readout; the stamp is that of the middle row
 };
 
 // LiDAR points with the pose of their sensor in the camera. A cloud its sensor side calls degraded (smoke) must not be

@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "components/thermal_odometry/patch_block.hpp"
+
 namespace adit::thermal_odometry {
 namespace {
 
@@ -121,38 +123,16 @@ Initialiser::System Initialiser::linearise(const Pyramid& pyramid, const CameraS
     system.inliers += point.good ? 1 : 0;
     const Eigen::Matrix<float, 2, 6> J = pixel_jacobian(warp.fx, warp.fy, view.x, view.y, point.d * view.rho);
     const Eigen::Vector2f Jd = view.by_depth(warp);
-    const Pattern ja = -warp.gain * look.intensity;
-    const Pattern wgx = w * view.gx;
-    const Pattern wgy = w * view.gy;
-    Eigen::Matrix2f G;
-    G(0, 0) = (wgx * view.gx).sum();
-    G(0, 1) = G(1, 0) = (wgx * view.gy).sum();
-    G(1, 1) = (wgy * view.gy).sum();
-    const Eigen::Vector2f gr((wgx * r).sum(), (wgy * r).sum());
-    Eigen::Matrix2f affine;
-    affine << (wgx * ja).sum(), -wgx.sum(), (wgy * ja).sum(), -wgy.sum();
-    Eigen::Matrix<float, 8, 8> H;
-    H.topLeftCorner<6, 6>().noalias() = J.transpose() * (G * J);
-    H.topRightCorner<6, 2>().noalias() = J.transpose() * affine;
-    H.bottomLeftCorner<2, 6>() = H.topRightCorner<6, 2>().transpose();
-    H(6, 6) = (w * ja.square()).sum();
-    H(6, 7) = H(7, 6) = -(w * ja).sum();
-    H(7, 7) = w.sum();
-    Eigen::Matrix<float, 8, 1> g;
-    g.head<6>().noalias() = J.transpose() * gr;
-    g[6] = (w * ja * r).sum();
-    g[7] = -(w * r).sum();
-    const Eigen::Vector2f GJd = G * Jd;
-    elimination.c.head<6>().noalias() = J.transpose() * GJd;
-    elimination.c.tail<2>().noalias() = affine.transpose() * Jd;
-    point.hessian = Jd.dot(GJd);
+    PatchBlock block = patch_block(view, J, Jd, w, r, -warp.gain * look.intensity);
+    elimination.c = block.coupling;
+    point.hessian = block.depth_H;
     elimination.H = (elimination.H + point.hessian) * static_cast<float>(1.0 + damping);
-    elimination.g += Jd.dot(gr);
+    elimination.g += block.depth_g;
     const float inverse = 1.0F / elimination.H;
-    H.noalias() -= elimination.c * elimination.c.transpose() * inverse;
-    g.noalias() -= elimination.c * (elimination.g * inverse);
-    system.H += H.cast<double>();
-    system.g += g.cast<double>();
+    block.H.noalias() -= elimination.c * elimination.c.transpose() * inverse;
+    block.g.noalias() -= elimination.c * (elimination.g * inverse);
+    system.H += block.H.cast<double>();
+    system.g += block.g.cast<double>();
   }
   const double gain_information = 1.0 / (0.05 * 0.05);
   system.H(6, 6) += gain_information;

@@ -22,7 +22,7 @@ std::size_t capacity_for(int wanted) {
 }  // namespace
 
 Mapper::Mapper(const CameraModel& camera, int levels, const Config& config)
-    : camera_{camera.fx, camera.fy, camera.cx, camera.cy},
+    : camera_(pinhole_of(camera)),
       width_(camera.width),
       height_(camera.height),
       config_(config),
@@ -155,7 +155,7 @@ Mapper::Report Mapper::add_keyframe(std::int64_t stamp_ns, const CameraState& st
   Report report;
   const std::span<const Pixel> pixels = selector_.select(image, rectifier);
   report.selected = static_cast<int>(pixels.size());
-  anchor_.project(lidar ? clouds_.at(stamp_ns, history) : std::span<const Eigen::Vector3f>{});
+  anchor_.project(lidar ? clouds_.at(stamp_ns, history) : std::span<const Eigen::Vector3f>{}, state.rate);
   for (const Pixel& pixel : pixels) report.anchored += anchor_.depth_at(pixel.u, pixel.v) ? 1 : 0;
   report.metric = report.anchored >= config_.min_points;
   const bool first = empty();

@@ -24,10 +24,10 @@ class Mapper {
     int anchored_keyframes = 4;    // in the window
     int mono_keyframes = 6;        // at most max_keyframes - 1
     int anchored_views = 2;        // newest keyframes a frame is aligned to jointly; monocular: all
-    int min_texture = 100;         // grid cells with a strong gradient, to begin a map
+    int min_texture = 85;          // grid cells with a strong gradient, to begin a map
     int min_points = 150;          // with LiDAR depth, for a keyframe that counts as anchored
     bool optimise = true;          // off, anchored mode: frame to keyframe alone
-    float lidar_looseness = 5.0F;  // of the depth prior's sigma: absorbs a boresight error the pixels disagree with
+    float lidar_looseness = 3.0F;  // of the depth prior's sigma: absorbs a boresight error the pixels disagree with
     std::size_t max_cloud_points = 1U << 17U;
     double max_cloud_age_s = 0.2;  // from the last point of the sweep
   };

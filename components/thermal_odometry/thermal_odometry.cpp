@@ -26,7 +26,7 @@ class ThermalOdometry::Engine {
  public:
   Engine(const CameraModel& camera, const Config& config)
       : config_(config),
-        pinhole_{camera.fx, camera.fy, camera.cx, camera.cy},
+        pinhole_(pinhole_of(camera)),
         width_(camera.width),
         height_(camera.height),
         gate_(camera, config.gate),
@@ -271,6 +271,8 @@ class ThermalOdometry::Engine {
     }
     const int top = gap ? Pyramid::max_levels - 1 : 3;
     CameraState start{constant_velocity, last_a_, last_b_};
+    Tracker::Before before{T_cw_, dt, Vector6d::Zero()};
+    if (has_velocity_ && !gap) before.rate_change = velocity_change_;
     if (gap) start.a = reference.state.a;
     double best_cost = std::numeric_limits<double>::infinity();
     for (int i = 0; i < count && count > 1; ++i) {
@@ -283,11 +285,13 @@ class ThermalOdometry::Engine {
       }
     }
     const Tracker::PosePrior* information = prior_usable && config_.prior_as_information ? &pose_prior : nullptr;
-    TrackResult result = tracker_->track(current_, start, top, information);
-    if (!result.ok) result = search(start, information);
+    TrackResult result = tracker_->track(current_, start, top, information, &before);
+    if (!result.ok) result = search(start, information, before);
     report(result);
     if (!result.ok) {
-      fail(stamp_ns, constant_velocity);
+      // Residuals like noise, but nothing in them that both images have: there is no texture to be lost.
+      const bool empty = result.inlier_share > 0.8F && result.correlation < 0.5F * config_.tracker.min_correlation;
+      fail(stamp_ns, constant_velocity, empty ? Status::low_texture : Status::recovering);
       return;
     }
     accept(stamp_ns, dt, result);
@@ -299,11 +303,12 @@ class ThermalOdometry::Engine {
     const bool moved_on = result.median_flow > flow * width_ || result.visible_share < visible ||
                           (age > config_.max_keyframe_age_s && (anchored || result.median_flow > 0.3 * flow * width_));
     const bool young_map = anchored && map_keyframes_ < 4;
-    if (gap || young_map || (age >= min_age && moved_on)) make_keyframe(stamp_ns, result);
+    const bool vanishing = age >= config_.young_keyframe_age_s && result.visible_share < 0.67 * visible;
+    if (gap || young_map || vanishing || (age >= min_age && moved_on)) make_keyframe(stamp_ns, result);
   }
 
   // Small rotations about the start, from the coarsest level: only after a failure.
-  TrackResult search(const CameraState& start, const Tracker::PosePrior* prior) {
+  TrackResult search(const CameraState& start, const Tracker::PosePrior* prior, const Tracker::Before& before) {
     TrackResult best;
     const int top = current_.levels() - 1;
     double best_cost = std::numeric_limits<double>::infinity();
@@ -320,11 +325,11 @@ class ThermalOdometry::Engine {
         }
       }
     }
-    if (std::isfinite(best_cost)) best = tracker_->track(current_, best_start, top, prior);
+    if (std::isfinite(best_cost)) best = tracker_->track(current_, best_start, top, prior, &before);
     if (best.ok) return best;
     CameraState still = start;
     still.T_cw = T_cw_;
-    return tracker_->track(current_, still, top, prior);
+    return tracker_->track(current_, still, top, prior, &before);
   }
 
   void report(const TrackResult& result) {
@@ -343,7 +348,10 @@ class ThermalOdometry::Engine {
       out_.previous_stamp_ns = last_stamp_ns_;
       out_.T_previous_camera = T_current_previous.inverse();
     }
-    velocity_ = se3_log(T_current_previous) / dt;
+    const Vector6d velocity = se3_log(T_current_previous) / dt;
+    velocity_change_.setZero();
+    if (has_velocity_ && dt < config_.gap_s) velocity_change_ = 0.5 * (velocity - velocity_);
+    velocity_ = velocity;
     has_velocity_ = true;
     T_cw_ = result.state.T_cw;
     last_a_ = result.state.a;
@@ -374,10 +382,10 @@ class ThermalOdometry::Engine {
   }
 
   // Not aligned: keep the map and the last measured pose, report the prediction, give the map up after a few frames.
-  void fail(std::int64_t stamp_ns, const Pose& predicted) {
+  void fail(std::int64_t stamp_ns, const Pose& predicted, Status status) {
     ++out_.counters.failed;
     ++failures_;
-    out_.status = Status::recovering;
+    out_.status = status;
     out_.T_odom_camera = predicted.inverse();
     if (failures_ < config_.restart_after) return;
     ++out_.counters.restarts;
@@ -406,7 +414,8 @@ class ThermalOdometry::Engine {
   double last_a_ = 0.0;
   double last_b_ = 0.0;
   std::int64_t last_stamp_ns_ = 0;
-  Vector6d velocity_ = Vector6d::Zero();
+  Vector6d velocity_ = Vector6d::Zero();         // mean of the last interval
+  Vector6d velocity_change_ = Vector6d::Zero();  // from the middle of an interval to its end
   bool has_velocity_ = false;
   int failures_ = 0;
   Estimate out_;

@@ -40,6 +40,7 @@ struct Config {
   double mono_keyframe_flow = 0.05;
   double anchored_visible_share = 0.5;
   double mono_visible_share = 0.6;
+  double young_keyframe_age_s = 0.1;  // at least, when less than two thirds of the visible share are left
   double gap_s = 0.1;                 // longer since the last frame: start coarser, new keyframe
   int restart_after = 5;              // frames that could not be aligned
   bool prior_as_information = false;  // besides starting there: add the prior to the normal equations (paper R63)

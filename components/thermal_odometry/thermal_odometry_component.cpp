@@ -115,6 +115,7 @@ class ThermalOdometryComponent final : public Component {
   Result<void> activate() override;
   void on_time_jump(Duration) override;
   Result<void> calibrate(const thermal_odometry::CameraModel& camera);
+  void set_row_time(double row_time);
   void on_camera_info(const CameraInfo& info);
   void on_cloud(const PointCloud2& message);
   void on_prior(const Odometry& message);
@@ -163,6 +164,14 @@ Result<void> ThermalOdometryComponent::calibrate(const thermal_odometry::CameraM
   camera_ = camera;
   map_points_.resize(4096);
   return {};
+}
+
+// The frame says how its rows follow each other, the calibration does not.
+void ThermalOdometryComponent::set_row_time(double row_time) {
+  if (std::abs(row_time - camera_.row_time) <= 0.01 * camera_.row_time) return;
+  thermal_odometry::CameraModel camera = camera_;
+  camera.row_time = row_time;
+  if (const Result<void> done = calibrate(camera); !done) trouble_ = done.error().message;
 }
 
 Result<void> ThermalOdometryComponent::activate() {
@@ -265,6 +274,7 @@ void ThermalOdometryComponent::process(const ThermalFrameView& view, thermal_odo
     health(Health::warn, std::to_string(counts_.uncalibrated) + " frames without calibration: " + why);
     return;
   }
+  if (view.height() == static_cast<std::size_t>(camera_.height)) set_row_time(readout / camera_.height);
   frame.width = static_cast<int>(view.width());
   frame.height = static_cast<int>(view.height());
   frame.saturation = view.saturation();
@@ -320,8 +330,16 @@ void ThermalOdometryComponent::draw(const thermal_odometry::Frame& frame, const 
   message->encoding = "rgb8";
   message->data.resize(std::size_t{message->step} * message->height);
   const std::size_t n = engine_->map_points(map_points_);
-  thermal_odometry::draw_points(frame, camera_, std::span(map_points_).first(n), {},
-                                {message->data.mutable_data(), message->data.size()}, pixels_);
+  const auto points = std::span(map_points_).first(n);
+  thermal_odometry::DepthColours colours;
+  if (engine_->estimate().scale == thermal_odometry::ScaleState::arbitrary && n > 0) {
+    const auto middle = points.begin() + static_cast<std::ptrdiff_t>(n / 2);
+    std::nth_element(points.begin(), middle, points.end(),
+                     [](const auto& a, const auto& b) { return a.depth < b.depth; });
+    colours = {0.3F * middle->depth, 5.0F * middle->depth};
+  }
+  thermal_odometry::draw_points(frame, camera_, points, colours, {message->data.mutable_data(), message->data.size()},
+                                pixels_);
   points_image_.publish(std::move(message));
 }
 

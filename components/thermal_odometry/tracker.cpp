@@ -152,8 +152,7 @@ double Tracker::median_offset(const Pyramid& pyramid, const CameraState& state, 
     if (templates[i].weight[0] == 0.0F) continue;
     const Patch& patch = patches_[i];
     const Warp& relative = relatives[static_cast<std::size_t>(patch.host)];
-    const Eigen::Vector3f X = relative.base + at_level(patch.u, level) * relative.step_u +
-                              at_level(patch.v, level) * relative.step_v + patch.inverse_depth * relative.t;
+    const Eigen::Vector3f X = relative.ray(at_level(patch.u, level), at_level(patch.v, level), patch.inverse_depth);
     if (!(X.z() > 0.05F)) continue;
     const float px = static_cast<float>(camera.fx) * X.x() / X.z() + static_cast<float>(camera.cx);
     const float py = static_cast<float>(camera.fy) * X.y() / X.z() + static_cast<float>(camera.cy);
@@ -178,10 +177,7 @@ float Tracker::median_flow(const CameraState& state) const {
   const auto fx = static_cast<float>(camera_.fx);
   const auto fy = static_cast<float>(camera_.fy);
   for (const Patch& patch : patches_) {
-    const auto project = [&](const Warp& relative) {
-      return Eigen::Vector3f(relative.base + patch.u * relative.step_u + patch.v * relative.step_v +
-                             patch.inverse_depth * relative.t);
-    };
+    const auto project = [&](const Warp& relative) { return relative.ray(patch.u, patch.v, patch.inverse_depth); };
     const Eigen::Vector3f before = project(to_newest[static_cast<std::size_t>(patch.host)]);
     const Eigen::Vector3f after = project(to_current[static_cast<std::size_t>(patch.host)]);
     if (!(before.z() > 0.05F && after.z() > 0.05F)) continue;
@@ -210,8 +206,8 @@ float Tracker::correlation(const Pyramid& pyramid, const CameraState& state, int
     if (templates[i].weight[0] == 0.0F) continue;
     const Patch& patch = patches_[i];
     const Warp& relative = relatives[static_cast<std::size_t>(patch.host)];
-    const Eigen::Vector3f centre = relative.base + at_level(patch.u, level) * relative.step_u +
-                                   at_level(patch.v, level) * relative.step_v + patch.inverse_depth * relative.t;
+    const Eigen::Vector3f centre =
+        relative.ray(at_level(patch.u, level), at_level(patch.v, level), patch.inverse_depth);
     for (int k = 0; k < pattern_size; ++k) {
       const Eigen::Vector3f X = centre + pattern_x[static_cast<std::size_t>(k)] * relative.step_u +
                                 pattern_y[static_cast<std::size_t>(k)] * relative.step_v;
@@ -234,14 +230,19 @@ float Tracker::correlation(const Pyramid& pyramid, const CameraState& state, int
   return variance > 0.0 ? static_cast<float>((n * sum_ab - sum_a * sum_b) / std::sqrt(variance)) : 0.0F;
 }
 
-TrackResult Tracker::track(const Pyramid& image, const CameraState& start, int top_level,
-                           const PosePrior* prior) const {
+TrackResult Tracker::track(const Pyramid& image, const CameraState& start, int top_level, const PosePrior* prior,
+                           const Before* before) const {
   TrackResult result;
   result.state = start;
   if (patches_.empty() || views_.empty()) return result;
   const int top = std::min(top_level, levels_ - 1);
   const double reference_a = views_[static_cast<std::size_t>(newest_)].state.a;
   CameraState state = start;
+  const auto update_rate = [&] {
+    if (before == nullptr || camera_.row_time == 0.0) return;
+    state.rate = se3_log(state.T_cw * before->T_cw.inverse()) / before->dt + before->rate_change;
+  };
+  update_rate();
   state.b += median_offset(image, state, top);
   float sigma = config_.max_sigma * 0.5F;
   System system;
@@ -265,6 +266,7 @@ TrackResult Tracker::track(const Pyramid& image, const CameraState& start, int t
       state.T_cw = se3_exp(step.head<6>()) * state.T_cw;
       state.a += step[6];
       state.b += step[7];
+      update_rate();
       if (step.head<3>().norm() < config_.stop_translation && step.segment<3>(3).norm() < config_.stop_rotation) break;
     }
   }

@@ -66,9 +66,17 @@ class Tracker {
     Pose T_cw = Pose::Identity();
     Matrix6d information = Matrix6d::Zero();
   };
+  // What the image's own rates follow from while it is aligned: its motion since another pose, and how that changed
+  // before.
+  struct Before {
+    Pose T_cw = Pose::Identity();
+    double dt = 0.0;                          // s
+    Vector6d rate_change = Vector6d::Zero();  // from the middle of the interval to its end, as it was last time
+  };
   // From `start` at `top_level` down to the finest. The brightness offset of `start` is replaced by the median residual
   // at the top level, which alone absorbs the jump of a flat-field correction.
-  TrackResult track(const Pyramid& image, const CameraState& start, int top_level, const PosePrior* prior) const;
+  TrackResult track(const Pyramid& image, const CameraState& start, int top_level, const PosePrior* prior,
+                    const Before* before = nullptr) const;
 
  private:
   using Matrix8f = Eigen::Matrix<float, 8, 8>;

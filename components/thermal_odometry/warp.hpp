@@ -15,9 +15,10 @@
 namespace adit::thermal_odometry {
 
 struct CameraState {
-  Pose T_cw = Pose::Identity();
-  double a = 0.0;  // log gain
-  double b = 0.0;  // noise units
+  Pose T_cw = Pose::Identity();      // at the middle row
+  double a = 0.0;                    // log gain
+  double b = 0.0;                    // noise units
+  Vector6d rate = Vector6d::Zero();  // d/dt T_cw = rate T_cw, for the rows of a rolling readout [1/s]
 };
 
 // The pattern around a pixel of its host keyframe, on a plane in inverse depth.
@@ -55,6 +56,15 @@ struct Warp {
   float cy;
   float gain;    // e^(a_j - a_i)
   float offset;  // b_j - gain b_i
+  // A rolling readout sees each row at its own time: host and target are moved by their rates to that of the patch.
+  bool rolling = false;
+  float row_time;
+  float middle_row;
+  Eigen::Vector3f host_velocity;
+  Eigen::Vector3f host_spin;
+  Eigen::Vector3f velocity;
+  Eigen::Vector3f spin;
+  Eigen::Matrix3f R;
 
   Warp() = default;
   Warp(const CameraState& host, const CameraState& target, const Pinhole& camera)
@@ -63,7 +73,7 @@ struct Warp {
         cx(static_cast<float>(camera.cx)),
         cy(static_cast<float>(camera.cy)) {
     const Pose T = target.T_cw * host.T_cw.inverse();
-    const Eigen::Matrix3f R = T.linear().cast<float>();
+    R = T.linear().cast<float>();
     t = T.translation().cast<float>();
     step_u = R.col(0) / fx;
     step_v = R.col(1) / fy;
@@ -71,10 +81,29 @@ struct Warp {
     const double ratio = std::exp(target.a - host.a);
     gain = static_cast<float>(ratio);
     offset = static_cast<float>(target.b - ratio * host.b);
+    rolling = camera.row_time != 0.0;
+    if (!rolling) return;
+    row_time = static_cast<float>(camera.row_time);
+    middle_row = static_cast<float>(camera.middle_row);
+    host_velocity = host.rate.head<3>().cast<float>();
+    host_spin = host.rate.tail<3>().cast<float>();
+    velocity = target.rate.head<3>().cast<float>();
+    spin = target.rate.tail<3>().cast<float>();
   }
 
   // The point, scaled by its inverse depth in the host.
-  Eigen::Vector3f ray(float u, float v, float d) const { return base + u * step_u + v * step_v + d * t; }
+  Eigen::Vector3f ray(float u, float v, float d) const {
+    const Eigen::Vector3f X = base + u * step_u + v * step_v + d * t;
+    return rolling ? at_its_row(X, u, v, d) : X;
+  }
+  // To first order in the time of a readout, in which nothing moves further than the texture is large.
+  Eigen::Vector3f at_its_row(Eigen::Vector3f X, float u, float v, float d) const {
+    const Eigen::Vector3f seen = R.transpose() * (base + u * step_u + v * step_v);  // (x, y, 1) in the host
+    X -= row_time * (v - middle_row) * (R * (host_spin.cross(seen) + d * host_velocity));
+    if (!(X.z() > 0.05F)) return X;
+    const float row = fy * X.y() / X.z() + cy;
+    return X + row_time * (row - middle_row) * (spin.cross(X) + d * velocity);
+  }
   // Pixel of a point with z > 0.
   Eigen::Vector2f pixel(const Eigen::Vector3f& X) const { return {fx * X.x() / X.z() + cx, fy * X.y() / X.z() + cy}; }
 };
