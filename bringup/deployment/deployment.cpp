@@ -143,6 +143,11 @@ void read_inputs(const YamlSection& section, ComponentConfig& config) {
                         : when == "drop_newest" ? WhenFull::drop_newest
                                                 : WhenFull::drop_oldest;
     }
+    if (input.has("reliability")) {
+      entry.reliability = input.choice("reliability", {"reliable", "best_effort"}) == "reliable"
+                              ? Qos::Reliability::reliable
+                              : Qos::Reliability::best_effort;
+    }
   }
 }
 

@@ -151,6 +151,12 @@ TEST_F(DeploymentTest, LinksThatCannotWorkAreFoundBeforeLaunch) {
   ASSERT_TRUE(findings);
   ASSERT_EQ(findings->size(), 1u);
   EXPECT_THAT(findings->front(), HasSubstr("/chatter: /test_speaker -> /test_hearer: reliability offered best effort"));
+
+  const Result<Deployment> mended = load(
+      "processes:\n  - {name: a, components: [{type: test_speaker}]}\n  - {name: b, components: [{type: "
+      "test_hearer, inputs: {chatter: {reliability: best_effort}}}]}\n");
+  ASSERT_TRUE(mended) << mended.error().message;
+  EXPECT_TRUE(check_links(*mended)->empty());
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ namespace adit {
 struct InputOverride {
   std::optional<std::size_t> queue;
   std::optional<WhenFull> when_full;
+  std::optional<Qos::Reliability> reliability;
 };
 
 struct ComponentConfig {

@@ -89,15 +89,17 @@ Result<void> ComponentCore::bind(const ComponentConfig& config, std::shared_ptr<
   }
   for (InputBase* input : inputs_) {
     Queue queue = input->queue_;
+    Qos::Reliability reliability = input->qos_.reliability;
     if (const auto found = config.inputs.find(input->name()); found != config.inputs.end()) {
       queue.size = found->second.queue.value_or(queue.size);
       queue.when_full = found->second.when_full.value_or(queue.when_full);
+      reliability = found->second.reliability.value_or(reliability);
     }
     if (queue.size < 1 || queue.size > 100'000) {
       return Error{ErrorCode::invalid_argument, full_name_ + ": input '" + input->name() + "' has a queue of " +
                                                     std::to_string(queue.size) + ", give 1..100000"};
     }
-    input->bind(resolve_topic(input->name()), queue);
+    input->bind(resolve_topic(input->name()), queue, reliability);
   }
   for (OutputBase* output : outputs_) output->bind(resolve_topic(output->name()));
   return set_parameters(params_, config.parameters, full_name_);

@@ -45,9 +45,10 @@ InputStats InputBase::stats() const {
 // --- Lifecycle
 // ---------------------------------------------------------------------------------------------------------
 
-void InputBase::bind(std::string topic, const Queue& queue) {
+void InputBase::bind(std::string topic, const Queue& queue, Qos::Reliability reliability) {
   topic_name_ = std::move(topic);
   queue_ = queue;
+  qos_.reliability = reliability;
 }
 
 Result<void> InputBase::open(Participant* participant, LocalBus& bus) {

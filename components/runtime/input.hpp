@@ -60,7 +60,7 @@ class InputBase {
   };
 
   // The component's side; see component_core.hpp for when.
-  void bind(std::string topic, const Queue& queue);
+  void bind(std::string topic, const Queue& queue, Qos::Reliability reliability);
   Result<void> open(Participant* participant, LocalBus& bus);
   void start();
   void stop();
@@ -78,7 +78,7 @@ class InputBase {
   ComponentCore& core_;
   const std::string name_;
   const ErasedType& type_;
-  const Qos qos_;
+  Qos qos_;  // fixed by bind()
   const ErasedHandler handler_;
   Queue queue_;
   std::string topic_name_;

@@ -123,11 +123,12 @@ TEST(Ports, BlockNeverWaitsForTheOnlyThreadThatCouldMakeRoom) {
   EXPECT_EQ(listener.input.stats().dropped, 1u);
 }
 
-TEST(Ports, TheDeploymentMayOverrideTopicAndQueue) {
+TEST(Ports, TheDeploymentMayOverrideTopicQueueAndReliability) {
   Harness harness;
   ComponentConfig remapped;
   remapped.remap["numbers"] = "/counted";
-  remapped.inputs["numbers"] = {.queue = 1, .when_full = WhenFull::drop_newest};
+  remapped.inputs["numbers"] = {
+      .queue = 1, .when_full = WhenFull::drop_newest, .reliability = Qos::Reliability::best_effort};
   auto& listener = harness.make<Listener>("listener", remapped);
   ComponentConfig in_namespace;
   in_namespace.namespace_ = "/front";
@@ -135,6 +136,7 @@ TEST(Ports, TheDeploymentMayOverrideTopicAndQueue) {
   auto& talker = harness.make<Talker>("talker", in_namespace);
   harness.start();
   EXPECT_EQ(listener.input.info().topic, "/counted");
+  EXPECT_EQ(listener.input.info().qos.reliability, Qos::Reliability::best_effort);
   EXPECT_EQ(talker.output.info().topic, "/counted");
   EXPECT_EQ(talker.output.info().component, "/front/talker");
   talker.say(1);

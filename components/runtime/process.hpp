@@ -53,8 +53,8 @@ class Process {
   // Configures and activates each component in order, as far as its `start` says. On an error everything that was
   // started is stopped again.
   Result<void> start();
-  // Returns when `stop` is requested, a component finishes, or one failed and exit_when_a_component_fails is set. Tells the
-  // supervisor, when there is one, that it is alive (heartbeat.hpp). 0, or 1 when a component failed.
+  // Returns when `stop` is requested, a component finishes, or one failed and exit_when_a_component_fails is set. Tells
+  // the supervisor, when there is one, that it is alive (heartbeat.hpp). 0, or 1 when a component failed.
   int run(std::stop_token stop);
   void shutdown();
 

@@ -189,19 +189,20 @@ class TunnelSimulatorComponent final : public Component, private sim::Sink {
     post(delivery, points_, std::move(message), &lidar_);
   }
   void on_thermal(const sim::ThermalImage& image, const sim::Delivery& delivery) override {
-    auto message = std::make_shared<adit_msgs::msg::ThermalFrame>();
-    sim::fill(image, delivery, simulation_->scenario(), *message);
-    post(delivery, frame_, std::move(message), &thermal_);
-    if (image_.has_readers()) {
-      auto plain = std::make_shared<sensor_msgs::msg::Image>();
-      sim::fill(image, delivery, simulation_->scenario(), *plain);
-      post(delivery, image_, std::move(plain));
-    }
+    // The calibration goes first: who answers to a frame needs it, and the frame's answer is waited for.
     if (camera_info_.has_readers()) {
       auto info = std::make_shared<sensor_msgs::msg::CameraInfo>();
       sim::fill_camera_info(delivery, simulation_->scenario(), *info);
       post(delivery, camera_info_, std::move(info));
     }
+    if (image_.has_readers()) {
+      auto plain = std::make_shared<sensor_msgs::msg::Image>();
+      sim::fill(image, delivery, simulation_->scenario(), *plain);
+      post(delivery, image_, std::move(plain));
+    }
+    auto message = std::make_shared<adit_msgs::msg::ThermalFrame>();
+    sim::fill(image, delivery, simulation_->scenario(), *message);
+    post(delivery, frame_, std::move(message), &thermal_);
   }
   void on_imu(const sim::ImuSample& sample, const sim::Delivery& delivery) override {
     auto message = std::make_shared<sensor_msgs::msg::Imu>();
