@@ -1,4 +1,4 @@
-// Runs the odometry over a folder of the tunnel simulator (`simulate_folder`) and prints its figures; a study, no test.
+// Runs the odometry over a folder of the tunnel simulator (`adit simulate`) and prints its figures; a study, no test.
 //   lidar_odometry_drive FOLDER [mode=default] [first=0] [scans=N] [every=20] [prior=PERCENT] [organised=1] [tum=FILE]
 //   [from=0: sweeps before this one are not counted in shares and largest errors]
 // prior: wheel and gyroscope with this scale error of the way. organised=0: the points as the folder has them.
