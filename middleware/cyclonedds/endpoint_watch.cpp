@@ -24,10 +24,11 @@ void EventHub::emit(const Event& event) {
 std::unique_ptr<dds_listener_t, EndpointWatch::ListenerDeleter> EndpointWatch::make_listener() {
   std::unique_ptr<dds_listener_t, ListenerDeleter> listener(dds_create_listener(this));
   if (is_writer_) {
-    dds_lset_publication_matched(listener.get(), [](dds_entity_t writer, const dds_publication_matched_status_t status,
-                                                    void* watch) {
-      static_cast<EndpointWatch*>(watch)->match(writer, status.last_subscription_handle, status.current_count_change);
-    });
+    dds_lset_publication_matched(listener.get(),
+                                 [](dds_entity_t writer, const dds_publication_matched_status_t status, void* watch) {
+                                   static_cast<EndpointWatch*>(watch)->on_match(writer, status.last_subscription_handle,
+                                                                                status.current_count_change);
+                                 });
     dds_lset_offered_incompatible_qos(
         listener.get(), [](dds_entity_t writer, const dds_offered_incompatible_qos_status_t status, void* watch) {
           static_cast<EndpointWatch*>(watch)->mismatch(writer, status.last_policy_id);
@@ -42,7 +43,7 @@ std::unique_ptr<dds_listener_t, EndpointWatch::ListenerDeleter> EndpointWatch::m
   } else {
     dds_lset_subscription_matched(listener.get(), [](dds_entity_t reader,
                                                      const dds_subscription_matched_status_t status, void* watch) {
-      static_cast<EndpointWatch*>(watch)->match(reader, status.last_publication_handle, status.current_count_change);
+      static_cast<EndpointWatch*>(watch)->on_match(reader, status.last_publication_handle, status.current_count_change);
     });
     dds_lset_requested_incompatible_qos(
         listener.get(), [](dds_entity_t reader, const dds_requested_incompatible_qos_status_t status, void* watch) {
@@ -77,6 +78,20 @@ Gid EndpointWatch::remote_gid(dds_entity_t entity, dds_instance_handle_t handle)
       is_writer_ ? dds_get_matched_subscription_data(entity, handle)
                  : dds_get_matched_publication_data(entity, handle));
   return endpoint ? to_gid(endpoint->key) : Gid();
+}
+
+// With the other side known before, Cyclone calls while it creates the entity, and cannot yet tell who that is.
+void EndpointWatch::on_match(dds_entity_t entity, dds_instance_handle_t handle, int change) {
+  const std::lock_guard lock(match_mutex_);
+  if (created_) return match(entity, handle, change);
+  early_matches_.emplace_back(handle, change);
+}
+
+void EndpointWatch::created(dds_entity_t entity) {
+  const std::lock_guard lock(match_mutex_);
+  created_ = true;
+  for (const auto& [handle, change] : early_matches_) match(entity, handle, change);
+  early_matches_ = {};
 }
 
 void EndpointWatch::match(dds_entity_t entity, dds_instance_handle_t handle, int change) {

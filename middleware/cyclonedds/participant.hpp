@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <set>
+#include <vector>
 
 #include "middleware/cyclonedds/configuration.hpp"
 #include "middleware/cyclonedds/discovery.hpp"
@@ -64,6 +65,8 @@ class EndpointWatch {
     void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
   };
   std::unique_ptr<dds_listener_t, ListenerDeleter> make_listener();
+  // The entity made with the listener can be asked now: matches of its creation are counted and told here.
+  void created(dds_entity_t entity);
 
   std::uint32_t matched() const { return matched_.load(std::memory_order_relaxed); }
   bool has_remote() const { return remote_.load(std::memory_order_relaxed) > 0; }
@@ -71,6 +74,7 @@ class EndpointWatch {
   void deadline_missed(const Gid& local);
 
  private:
+  void on_match(dds_entity_t entity, dds_instance_handle_t handle, int change);
   void match(dds_entity_t entity, dds_instance_handle_t handle, int change);
   void mismatch(dds_entity_t entity, std::uint32_t policy_id);
   void liveliness_lost(dds_entity_t entity, dds_instance_handle_t handle);
@@ -83,6 +87,9 @@ class EndpointWatch {
   const bool is_writer_;
   std::atomic<std::uint32_t> matched_ = 0;
   std::atomic<std::uint32_t> remote_ = 0;
+  std::mutex match_mutex_;  // one match after the other; guards the two below
+  bool created_ = false;
+  std::vector<std::pair<dds_instance_handle_t, int>> early_matches_;
   std::mutex mutex_;  // guards the two below
   std::map<dds_instance_handle_t, Gid> peers_;
   std::set<Gid> reported_;  // endpoints whose mismatch has been told

@@ -37,6 +37,7 @@ class CycloneReader final : public Reader {
       return to_error(reader_, "reader of " + config_.topic);
     }
     gid_ = gid_of(reader_);
+    watch_.created(reader_);
     return {};
   }
 

@@ -32,6 +32,7 @@ class CycloneWriter final : public Writer {
       return to_error(writer_, "writer of " + config_.topic);
     }
     gid_ = gid_of(writer_);
+    watch_.created(writer_);
     return {};
   }
 

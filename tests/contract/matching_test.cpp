@@ -35,6 +35,23 @@ TEST_P(Matching, MatchAndUnmatchAreEvents) {
   EXPECT_FALSE(writer->has_remote_readers());
 }
 
+TEST_P(Matching, ReadersKnownBeforeTheWriterAreMatchedReadersOfIt) {
+  const auto writer_side = open_one(GetParam().writer);
+  const auto reader_side = open_one(GetParam().reader);
+  const EventLog writer_log(*writer_side);
+  const auto reader = make_reader(*reader_side, endpoint("contract", Qos::reliable()));
+  ASSERT_TRUE(wait_until([&] {
+    const Graph graph = writer_side->graph();
+    return std::any_of(graph.endpoints.begin(), graph.endpoints.end(),
+                       [&](const EndpointInfo& endpoint) { return endpoint.gid == reader->gid(); });
+  }));
+  const auto writer = make_writer(*writer_side, endpoint("contract", Qos::reliable()));
+  EXPECT_TRUE(wait_until([&] { return writer->has_remote_readers(); }));
+  ASSERT_TRUE(writer_log.wait_for(Event::Kind::matched));
+  EXPECT_EQ(writer_log.of(Event::Kind::matched).front().remote, reader->gid());
+  EXPECT_EQ(writer_log.of(Event::Kind::matched).front().local, writer->gid());
+}
+
 TEST_P(Matching, LeavingParticipantIsSeenAndItsSuccessorMatches) {
   Link link(*this, GetParam(), Qos::reliable(), Qos::reliable());
   ASSERT_TRUE(link.reader && link.writer);
