@@ -11,6 +11,8 @@
 #include <set>
 #include <sstream>
 
+#include "components/config/quantity.hpp"
+
 namespace adit {
 
 struct YamlDocument::State {
@@ -174,14 +176,47 @@ double YamlSection::number(std::string_view key, std::optional<double> otherwise
   const double value = content_->get(key, otherwise, parse_number, "a number");
   if (value < range.minimum || value > range.maximum) {
     error(key, "'" + std::string(key) + "' must lie in " + range_text(range, unit));
+    return otherwise.value_or(0.0);
   }
   return value;
+}
+
+double YamlSection::quantity(std::string_view key, std::optional<double> otherwise, YamlRange range) const {
+  const YAML::Node found = content_->find(key);
+  if (!found.IsDefined()) return content_->get(key, otherwise, parse_number, "a number");
+  const std::optional<double> value = found.IsScalar() ? parse_quantity(found.Scalar()) : std::nullopt;
+  if (!value) {
+    error(key, "'" + std::string(key) + "': expected a number, optionally with a unit (" + quantity_units() +
+                   "), not " + shown(found));
+  } else if (*value < range.minimum || *value > range.maximum) {
+    error(key, "'" + std::string(key) + "': " + shown(found) + " is not within " + range_text(range, "in SI units"));
+  } else {
+    return *value;
+  }
+  return otherwise.value_or(0.0);
+}
+
+std::vector<double> YamlSection::quantities(std::string_view key, std::size_t count, YamlRange range) const {
+  const YAML::Node found = content_->find(key);
+  std::vector<double> list;
+  if (!found.IsDefined()) return list;
+  if (found.IsSequence()) {
+    for (const YAML::Node& item : found) {
+      const std::optional<double> value = item.IsScalar() ? parse_quantity(item.Scalar()) : std::nullopt;
+      if (value && *value >= range.minimum && *value <= range.maximum) list.push_back(*value);
+    }
+    if (list.size() == count && found.size() == count) return list;
+  }
+  error(key, "'" + std::string(key) + "': expected a list of " + std::to_string(count) + " numbers within " +
+                 range_text(range, "in SI units"));
+  return {};
 }
 
 std::int64_t YamlSection::integer(std::string_view key, std::optional<std::int64_t> otherwise, YamlRange range) const {
   const std::int64_t value = content_->get(key, otherwise, parse_integer, "a whole number");
   if (static_cast<double>(value) < range.minimum || static_cast<double>(value) > range.maximum) {
     error(key, "'" + std::string(key) + "' must lie in " + range_text(range, ""));
+    return otherwise.value_or(0);
   }
   return value;
 }
@@ -290,6 +325,10 @@ void YamlSection::error(std::string_view key, const std::string& message) const 
   content_->error(content_->line_of(key), message);
 }
 
+bool YamlSection::ok() const {
+  return content_->document->errors.empty();
+}
+
 std::string YamlSection::place(std::string_view key) const {
   return content_->document->name + ":" + std::to_string(content_->line_of(key));
 }
@@ -298,7 +337,7 @@ Result<YamlDocument> YamlDocument::load(const std::string& path) {
   std::ifstream file(path);
   std::ostringstream text;
   if (!file || !(text << file.rdbuf())) {
-    return Error{ErrorCode::not_found, path + ": cannot read: " + std::strerror(errno ? errno : ENOENT)};
+    return Error{ErrorCode::not_found, path + ": cannot be read: " + std::strerror(errno ? errno : ENOENT)};
   }
   return parse(text.str(), path);
 }

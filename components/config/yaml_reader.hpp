@@ -37,6 +37,10 @@ class YamlSection {
   // Without a default the key is required. `unit` is for the message only.
   double number(std::string_view key, std::optional<double> otherwise = {}, YamlRange range = {},
                 std::string_view unit = "") const;
+  // A number that may have a unit ("36 km/h", "100 us", "5 deg": quantity.hpp), in SI units; the range is in these too.
+  double quantity(std::string_view key, std::optional<double> otherwise = {}, YamlRange range = {}) const;
+  // A list of `count` of them; empty when the key is absent.
+  std::vector<double> quantities(std::string_view key, std::size_t count, YamlRange range = {}) const;
   std::int64_t integer(std::string_view key, std::optional<std::int64_t> otherwise = {}, YamlRange range = {}) const;
   bool flag(std::string_view key, std::optional<bool> otherwise = {}) const;
   std::string text(std::string_view key, std::optional<std::string> otherwise = {}) const;
@@ -59,6 +63,8 @@ class YamlSection {
 
   // Notes an error at the key's line (or the section's, when the key is absent or empty).
   void error(std::string_view key, const std::string& message) const;
+  // Nothing was noted so far, anywhere in the document. Unknown keys are only found by YamlDocument::finish().
+  bool ok() const;
   // "file:line" of the key, or of the section.
   std::string place(std::string_view key = "") const;
 

@@ -243,5 +243,49 @@ TEST_F(BadScenario, IsRefusedWithFileAndLine) {
             std::string::npos);
 }
 
+TEST_F(BadScenario, AnyLineBrokenIsRefusedOrHarmless) {
+  const auto lines_of = [](const std::filesystem::path& file) {
+    std::vector<std::string> lines;
+    std::ifstream in(file);
+    for (std::string line; std::getline(in, line);) lines.push_back(line);
+    return lines;
+  };
+  int refused = 0;
+  const auto write_and_load = [&](const char* file, const std::vector<std::string>& lines) {
+    std::ofstream out(folder_ / file);
+    for (const std::string& line : lines) out << line << "\n";
+    out.close();
+    const auto loaded = load_scenario((folder_ / "s.yaml").string());
+    if (loaded) return;
+    ++refused;
+    EXPECT_EQ(loaded.error().message.rfind(folder_.string(), 0), 0U) << loaded.error().message;
+  };
+  auto scenario = lines_of(kScenarios / "s16_loops.yaml");
+  for (std::string& line : scenario) {
+    if (line.rfind("world:", 0) == 0) line = "world: w.yaml";
+  }
+  const auto world = lines_of(kScenarios / "worlds/zab.yaml");
+  for (const auto& [file, lines] : {std::pair("w.yaml", world), std::pair("s.yaml", scenario)}) {
+    write_and_load("w.yaml", world);
+    write_and_load("s.yaml", scenario);
+    ASSERT_TRUE(load_scenario((folder_ / "s.yaml").string()));
+    refused = 0;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      auto without = lines;
+      without.erase(without.begin() + static_cast<std::ptrdiff_t>(i));
+      write_and_load(file, without);
+      for (const char* word : {"x", "-1", "1e9", "[]"}) {
+        for (auto at = lines[i].find(": "); at != std::string::npos; at = lines[i].find(": ", at + 2)) {
+          const auto end = std::min(lines[i].find_first_of(",}", at), lines[i].size());
+          auto broken = lines;
+          broken[i].replace(at + 2, end - at - 2, word);
+          write_and_load(file, broken);
+        }
+      }
+    }
+    EXPECT_GT(refused, 50) << file;
+  }
+}
+
 }  // namespace
 }  // namespace adit::tunnel_simulator
