@@ -196,10 +196,8 @@ TEST(Evaluation, DegenerateInputGivesErrorsOrNothingButNoNan) {
 // The stored odometry of the real set drifts 1.1 m and 5.9 degrees against the set's reference (its README).
 TEST(Evaluation, RealTrajectoriesGiveTheKnownDrift) {
   const char* const shared = std::getenv("ADIT_SHARED");
-  const std::filesystem::path set = std::filesystem::path(shared ? shared : "../shared") / "data" / "subt_anymal_vlp16";
-  const std::filesystem::path from_source =
-      std::filesystem::path(__FILE__).parent_path() / "../../../shared/data/subt_anymal_vlp16";
-  const std::filesystem::path folder = std::filesystem::exists(set) ? set : from_source;
+  const std::filesystem::path folder =
+      std::filesystem::path(shared ? shared : ADIT_SOURCE_DIR "/../shared") / "data" / "subt_anymal_vlp16";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "skipped: no shared data";
   const Result<Trajectory> truth = read_tum((folder / "ref_lidar.tum").string());
   const Result<Trajectory> estimate = read_tum((folder / "maplab_lidar.tum").string());
