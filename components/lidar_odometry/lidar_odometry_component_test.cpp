@@ -10,12 +10,16 @@
 #include "components/lidar_odometry/test_scene.hpp"
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/stamp.hpp"
+#include "components/runtime/testing/recording.hpp"
 #include "idl/point_cloud_writer.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/point_cloud2.hpp"
 
 namespace adit {
 namespace {
+
+using testing::into;
+using testing::Recording;
 
 using namespace std::chrono_literals;
 using adit_msgs::msg::Localizability;
@@ -82,40 +86,12 @@ std::shared_ptr<Odometry> filter(Duration time, double jump = 0.0) {
   return message;
 }
 
-class Recording final : public OfflineSource {
- public:
-  template <class T>
-  void add(const std::string& topic, Duration arrival, std::shared_ptr<T> message) {
-    messages_.push_back(offline_message<T>(topic, Time(begin + arrival), std::move(message)));
-  }
-  void sort() {
-    std::stable_sort(messages_.begin(), messages_.end(),
-                     [](const OfflineMessage& a, const OfflineMessage& b) { return a.stamp < b.stamp; });
-  }
-  Result<bool> next(OfflineMessage& out) override {
-    if (next_ == messages_.size()) return false;
-    out = messages_[next_++];
-    return true;
-  }
-
- private:
-  std::vector<OfflineMessage> messages_;
-  std::size_t next_ = 0;
-};
-
 struct Outcome {
   std::vector<Odometry> poses;
   std::vector<Localizability> localizability;
   std::vector<std::byte> bytes;
   double along() const { return -poses.back().pose.pose.position.x; }  // the odometry's x looks backwards
 };
-
-template <class T>
-OfflineRunner::Sink into(std::vector<T>& out) {
-  return [&out](const ErasedType&, const std::shared_ptr<const void>& message, const MessageInfo&) {
-    out.push_back(*static_cast<const T*>(message.get()));
-  };
-}
 
 const std::vector<std::shared_ptr<PointCloud2>>& clouds(bool smooth) {
   const auto make = [](const lidar_odometry::Scene& scene) {
@@ -150,8 +126,8 @@ Outcome run(bool smooth, const std::string& kind, const More& more = nullptr) {
   (*runner)->tap_cdr("/odometry", bytes);
   (*runner)->tap_cdr("/localizability", bytes);
   Recording recording;
-  for (int k = 0; k < sweeps; ++k) recording.add("/points", (k + 1) * 100ms + 5ms, clouds(smooth)[k]);
-  for (Duration t = 0ms; t < 2200ms; t += 10ms) recording.add("/prior", t + 1ms, filter(t));
+  for (int k = 0; k < sweeps; ++k) recording.add("/points", Time(begin + (k + 1) * 100ms + 5ms), clouds(smooth)[k]);
+  for (Duration t = 0ms; t < 2200ms; t += 10ms) recording.add("/prior", Time(begin + t + 1ms), filter(t));
   if (more) more(recording);
   recording.sort();
   const auto done = (*runner)->run(recording);
@@ -217,8 +193,8 @@ TEST(LidarOdometryComponent, RepeatedAndLatePriorsChangeNothing) {
   EXPECT_EQ(once.bytes, run(true, "velocity").bytes);
   const Outcome again = run(true, "velocity", [](Recording& recording) {
     for (Duration t = 0ms; t < 2000ms; t += 30ms) {
-      recording.add("/prior", t + 2ms, filter(t));
-      recording.add("/prior", t + 53ms, filter(t, 5.0));
+      recording.add("/prior", Time(begin + t + 2ms), filter(t));
+      recording.add("/prior", Time(begin + t + 53ms), filter(t, 5.0));
     }
   });
   EXPECT_EQ(once.bytes, again.bytes);
@@ -237,8 +213,8 @@ TEST(LidarOdometryComponent, GoesOnWhenALivePriorStops) {
   ASSERT_TRUE(runner);
   (*runner)->tap("/odometry", into(poses));
   Recording recording;
-  for (int k = 0; k < sweeps; ++k) recording.add("/points", (k + 1) * 100ms + 5ms, clouds(true)[k]);
-  for (Duration t = 0ms; t < 1200ms; t += 10ms) recording.add("/prior", t + 1ms, filter(t));
+  for (int k = 0; k < sweeps; ++k) recording.add("/points", Time(begin + (k + 1) * 100ms + 5ms), clouds(true)[k]);
+  for (Duration t = 0ms; t < 1200ms; t += 10ms) recording.add("/prior", Time(begin + t + 1ms), filter(t));
   recording.sort();
   ASSERT_TRUE((*runner)->run(recording));
   ASSERT_EQ(poses.size(), static_cast<std::size_t>(sweeps));
@@ -254,7 +230,7 @@ TEST(LidarOdometryComponent, RefusesAMountingThatIsNone) {
   auto runner = OfflineRunner::build({config});
   ASSERT_TRUE(runner);
   Recording recording;
-  recording.add("/points", 5ms, clouds(true)[0]);
+  recording.add("/points", Time(begin + 5ms), clouds(true)[0]);
   const auto done = (*runner)->run(recording);
   ASSERT_FALSE(done);
   EXPECT_NE(done.error().message.find("lidar_pose"), std::string::npos) << done.error().message;

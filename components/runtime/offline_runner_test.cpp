@@ -7,11 +7,14 @@
 
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
+#include "components/runtime/testing/recording.hpp"
 #include "sensor_msgs/msg/image.hpp"
 #include "std_msgs/msg/int64.hpp"
 
 namespace adit {
 namespace {
+
+using testing::Recording;
 
 using namespace std::chrono_literals;
 using sensor_msgs::msg::Image;
@@ -45,20 +48,6 @@ class Sum final : public Component {
                }};
 };
 ADIT_COMPONENT(Sum, "test_sum");
-
-class Recording final : public OfflineSource {
- public:
-  explicit Recording(std::vector<OfflineMessage> messages) : messages_(std::move(messages)) {}
-  Result<bool> next(OfflineMessage& out) override {
-    if (next_ == messages_.size()) return false;
-    out = messages_[next_++];
-    return true;
-  }
-
- private:
-  std::vector<OfflineMessage> messages_;
-  std::size_t next_ = 0;
-};
 
 OfflineMessage image(Duration stamp, std::size_t size) {
   auto message = std::make_shared<Image>();

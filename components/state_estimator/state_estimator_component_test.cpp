@@ -17,12 +17,16 @@
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/registry.hpp"
 #include "components/runtime/stamp.hpp"
+#include "components/runtime/testing/recording.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/nav_sat_fix.hpp"
 #include "tf2_msgs/msg/tf_message.hpp"
 
 namespace adit {
 namespace {
+
+using testing::into;
+using testing::Recording;
 
 using namespace std::chrono_literals;
 using adit_msgs::msg::FusionStatus;
@@ -63,31 +67,6 @@ void set_covariance(Odometry& message, const std::array<double, 6>& variances) {
   for (std::size_t i = 0; i < 6; ++i) message.pose.covariance[7 * i] = variances[i];
 }
 
-class Recording final : public OfflineSource {
- public:
-  void add(const std::string& topic, Duration arrival, const Odometry& message) {
-    messages_.push_back(offline_message<Odometry>(topic, Time(arrival), std::make_shared<const Odometry>(message)));
-  }
-  void add_fix(const std::string& topic, Duration arrival, const sensor_msgs::msg::NavSatFix& message) {
-    using sensor_msgs::msg::NavSatFix;
-    messages_.push_back(offline_message<NavSatFix>(topic, Time(arrival), std::make_shared<const NavSatFix>(message)));
-  }
-  void sort() {
-    std::stable_sort(messages_.begin(), messages_.end(),
-                     [](const OfflineMessage& a, const OfflineMessage& b) { return a.stamp < b.stamp; });
-    next_ = 0;
-  }
-  Result<bool> next(OfflineMessage& out) override {
-    if (next_ == messages_.size()) return false;
-    out = messages_[next_++];
-    return true;
-  }
-
- private:
-  std::vector<OfflineMessage> messages_;
-  std::size_t next_ = 0;
-};
-
 struct Drive {
   bool lidar = true, thermal = true;
   Duration length = 10s;
@@ -98,14 +77,14 @@ struct Drive {
 
   Recording record() const {
     Recording recording;
-    recording.add("/elsewhere", begin, Odometry{});
+    recording.add("/elsewhere", Time(begin), std::make_shared<Odometry>());
     const auto play = [&](const std::string& topic, Duration period, Duration latency, const auto& change) {
       for (int i = 0; i * period <= length; ++i) {
         const Duration stamp = begin + i * period;
         Odometry message = odometry(stamp, arc(std::chrono::duration<double>(i * period).count()), topic);
         Duration arrival = stamp + latency;
         if (change) change(message, arrival, i);
-        recording.add(topic, arrival, message);
+        recording.add(topic, Time(arrival), std::make_shared<Odometry>(message));
       }
     };
     if (lidar) play("/lidar", 100ms, 70ms, change_lidar);
@@ -114,9 +93,9 @@ struct Drive {
       sensor_msgs::msg::NavSatFix message;
       message.header.stamp = to_stamp(Time(begin + i * 200ms));
       fix(message, 0.2 * i);
-      recording.add_fix("/fix", begin + i * 200ms + 100ms, message);
+      recording.add("/fix", Time(begin + i * 200ms + 100ms), std::make_shared<sensor_msgs::msg::NavSatFix>(message));
     }
-    recording.add("/elsewhere", begin + length, Odometry{});
+    recording.add("/elsewhere", Time(begin + length), std::make_shared<Odometry>());
     recording.sort();
     return recording;
   }
@@ -166,13 +145,6 @@ bool finite(const Odometry& m) {
   for (const double c : m.twist.covariance) sum += c;
   return std::isfinite(sum) && std::abs(Eigen::Quaterniond(q.w, q.x, q.y, q.z).norm() - 1.0) < 1e-9 &&
          m.pose.covariance[0] >= 0.0 && m.pose.covariance[7] >= 0.0 && m.pose.covariance[35] >= 0.0;
-}
-
-template <class T>
-OfflineRunner::Sink into(std::vector<T>& out) {
-  return [&out](const ErasedType&, const std::shared_ptr<const void>& message, const MessageInfo&) {
-    out.push_back(*static_cast<const T*>(message.get()));
-  };
 }
 
 // Whatever went in: an output each 10 ms, finite, with its transform and status.

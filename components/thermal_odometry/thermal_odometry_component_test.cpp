@@ -13,6 +13,7 @@
 #include "adit_msgs/msg/thermal_health.hpp"
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/stamp.hpp"
+#include "components/runtime/testing/recording.hpp"
 #include "components/thermal_odometry/test_scene.hpp"
 #include "idl/point_cloud_writer.hpp"
 #include "nav_msgs/msg/odometry.hpp"
@@ -22,6 +23,9 @@
 
 namespace adit {
 namespace {
+
+using testing::into;
+using testing::Recording;
 
 using namespace std::chrono_literals;
 using adit_msgs::msg::ThermalFrame;
@@ -133,20 +137,6 @@ struct Drive {
   }
 };
 
-class Recording final : public OfflineSource {
- public:
-  explicit Recording(std::vector<OfflineMessage> messages) : messages_(std::move(messages)) {}
-  Result<bool> next(OfflineMessage& out) override {
-    if (next_ == messages_.size()) return false;
-    out = messages_[next_++];
-    return true;
-  }
-
- private:
-  std::vector<OfflineMessage> messages_;
-  std::size_t next_ = 0;
-};
-
 struct Outcome {
   std::vector<Odometry> poses;
   std::vector<ThermalHealth> health;
@@ -160,13 +150,6 @@ struct Outcome {
     return (Eigen::Vector3d(p.x, p.y, p.z) - truth.translation()).norm();
   }
 };
-
-template <class T>
-OfflineRunner::Sink into(std::vector<T>& out) {
-  return [&out](const ErasedType&, const std::shared_ptr<const void>& message, const MessageInfo&) {
-    out.push_back(*static_cast<const T*>(message.get()));
-  };
-}
 
 Outcome run(const Drive& drive, Value::Map parameters = rig(), bool picture = false) {
   Outcome out;
