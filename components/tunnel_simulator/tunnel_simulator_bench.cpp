@@ -149,40 +149,23 @@ void real_time_factor(benchmark::State& state) {
   state.counters["real_time_factor"] = benchmark::Counter(4.0, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-BENCHMARK(bare_lidar)
-    ->ArgName("threads")
-    ->Arg(1)
-    ->Arg(2)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime();
-BENCHMARK(lidar_sweep)
-    ->ArgNames({"threads", "effects"})
-    ->ArgsProduct({{1, 2}, {0, 1}})
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime();
-BENCHMARK(bare_thermal)
-    ->ArgName("threads")
-    ->Arg(1)
-    ->Arg(2)
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime();
-BENCHMARK(thermal_frame)
-    ->ArgNames({"threads", "effects"})
-    ->ArgsProduct({{1, 2}, {0, 1}})
-    ->Unit(benchmark::kMillisecond)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime();
-BENCHMARK(real_time_factor)
-    ->ArgName("threads")
-    ->Arg(1)
-    ->Arg(2)
-    ->Unit(benchmark::kSecond)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Iterations(1);
+// Wall time beside the CPU time of all threads.
+void one_or_two_threads(benchmark::internal::Benchmark* one) {
+  one->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+}
+void with_and_without_effects(benchmark::internal::Benchmark* one) {
+  one->ArgNames({"threads", "effects"})
+      ->ArgsProduct({{1, 2}, {0, 1}})
+      ->Unit(benchmark::kMillisecond)
+      ->MeasureProcessCPUTime()
+      ->UseRealTime();
+}
+
+BENCHMARK(bare_lidar)->Apply(one_or_two_threads);
+BENCHMARK(lidar_sweep)->Apply(with_and_without_effects);
+BENCHMARK(bare_thermal)->Apply(one_or_two_threads);
+BENCHMARK(thermal_frame)->Apply(with_and_without_effects);
+BENCHMARK(real_time_factor)->Apply(one_or_two_threads)->Unit(benchmark::kSecond)->Iterations(1);
 
 }  // namespace
 }  // namespace adit::tunnel_simulator
