@@ -2,16 +2,15 @@
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 
 #include "bringup/commands/command.hpp"
+#include "bringup/commands/odometry_output.hpp"
 #include "bringup/deployment/deployment.hpp"
 #include "components/dataset/dataset.hpp"
 #include "components/dataset/pcd_file.hpp"
 #include "components/dataset_player/recorded_messages.hpp"
 #include "components/geometry/trajectory.hpp"
 #include "components/runtime/offline_runner.hpp"
-#include "components/runtime/stamp.hpp"
 
 namespace adit {
 namespace {
@@ -36,7 +35,8 @@ class FolderSource final : public OfflineSource {
 
   Result<bool> next(OfflineMessage& out) override {
     if (handed_out_) {
-      milliseconds_.push_back(std::chrono::duration<double, std::milli>(Steady::now() - *handed_out_).count());
+      timing_.push_back({dataset_.entries[next_ - 1].stamp_ns,
+                         std::chrono::duration<double, std::milli>(Steady::now() - *handed_out_).count()});
       handed_out_.reset();
     }
     if (next_ == dataset_.entries.size()) return false;
@@ -63,7 +63,7 @@ class FolderSource final : public OfflineSource {
     return true;
   }
 
-  const std::vector<double>& milliseconds() const { return milliseconds_; }
+  const std::vector<FileTiming>& timing() const { return timing_; }
   const dataset::Dataset& dataset() const { return dataset_; }
 
  private:
@@ -79,29 +79,8 @@ class FolderSource final : public OfflineSource {
   std::size_t next_ = 0;
   bool prior_sent_ = false;
   std::optional<Steady::time_point> handed_out_;
-  std::vector<double> milliseconds_;
+  std::vector<FileTiming> timing_;
 };
-
-StampedPose stamped_pose(const Odometry& message) {
-  StampedPose pose;
-  pose.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
-  const auto& p = message.pose.pose.position;
-  const auto& q = message.pose.pose.orientation;
-  pose.pose.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized().toRotationMatrix();
-  pose.pose.translation() = Eigen::Vector3d(p.x, p.y, p.z);
-  return pose;
-}
-
-Result<void> write_timing(const std::string& path, const FolderSource& source) {
-  std::ofstream file(path);
-  file << "stamp_ns,ms\n";
-  for (std::size_t i = 0; i < source.milliseconds().size(); ++i) {
-    file << source.dataset().entries[i].stamp_ns << ',' << source.milliseconds()[i] << '\n';
-  }
-  file.flush();
-  if (!file) return Error{ErrorCode::io, path + ": cannot write"};
-  return {};
-}
 
 Result<void> run_lidar(const Arguments& arguments) {
   Result<dataset::Dataset> dataset = dataset::open_dataset(arguments.input, arguments.file_rate);
@@ -137,7 +116,7 @@ Result<void> run_lidar(const Arguments& arguments) {
   if (!done) return done.error();
   if (Result<void> written = write_tum(arguments.estimate, estimate); !written) return written;
   if (!arguments.timing.empty()) {
-    if (Result<void> written = write_timing(arguments.timing, source); !written) return written;
+    if (Result<void> written = write_timing(arguments.timing, source.timing()); !written) return written;
   }
   std::printf("%zu of %zu clouds have a pose; wrote %s\n", estimate.size(), source.dataset().entries.size(),
               arguments.estimate.c_str());

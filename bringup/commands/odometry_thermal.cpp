@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 
 #include "adit_msgs/msg/thermal_health.hpp"
 #include "bringup/commands/command.hpp"
+#include "bringup/commands/odometry_output.hpp"
 #include "bringup/commands/thermal_folder.hpp"
 #include "bringup/deployment/deployment.hpp"
-#include "components/runtime/stamp.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/image.hpp"
 
@@ -31,16 +30,6 @@ struct Arguments {
   double file_rate = 30.0;
 };
 
-StampedPose stamped_pose(const Odometry& message) {
-  StampedPose pose;
-  pose.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
-  const auto& p = message.pose.pose.position;
-  const auto& q = message.pose.pose.orientation;
-  pose.pose.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized().toRotationMatrix();
-  pose.pose.translation() = Eigen::Vector3d(p.x, p.y, p.z);
-  return pose;
-}
-
 bool write_picture(const std::string& path, const Image& image) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
@@ -49,15 +38,6 @@ bool write_picture(const std::string& path, const Image& image) {
   png.format = PNG_FORMAT_RGB;
   return png_image_write_to_file(&png, path.c_str(), 0, image.data.data(), static_cast<png_int_32>(image.step),
                                  nullptr) != 0;
-}
-
-Result<void> write_timing(const std::string& path, const ThermalFolderSource& source) {
-  std::ofstream file(path);
-  file << "stamp_ns,ms\n";
-  for (const auto& frame : source.timing()) file << frame.stamp_ns << ',' << frame.milliseconds << '\n';
-  file.flush();
-  if (!file) return Error{ErrorCode::io, path + ": cannot write"};
-  return {};
 }
 
 // What the parameter file says goes before what stands in the folder.
@@ -127,7 +107,7 @@ Result<void> run_thermal(const Arguments& arguments) {
   if (failed) return *failed;
   if (Result<void> written = write_tum(arguments.estimate, estimate); !written) return written;
   if (!arguments.timing.empty()) {
-    if (Result<void> written = write_timing(arguments.timing, source); !written) return written;
+    if (Result<void> written = write_timing(arguments.timing, source.timing()); !written) return written;
   }
   for (const ComponentStatus& status : (*runner)->status()) std::printf("%s\n", status.reason.c_str());
   std::printf("%zu of %zu frames have a pose; wrote %s\n", estimate.size(), source.frames(),

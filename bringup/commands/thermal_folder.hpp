@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bringup/commands/odometry_output.hpp"
 #include "components/dataset/dataset.hpp"
 #include "components/geometry/trajectory.hpp"
 #include "components/runtime/offline_runner.hpp"
@@ -33,11 +34,7 @@ class ThermalFolderSource final : public OfflineSource {
   ThermalFolderSource(ThermalFolder folder, Trajectory prior);
   Result<bool> next(OfflineMessage& out) override;
 
-  struct Timing {
-    std::int64_t stamp_ns;
-    double milliseconds;  // the components worked on the frame
-  };
-  const std::vector<Timing>& timing() const { return timing_; }
+  const std::vector<FileTiming>& timing() const { return timing_; }
   std::size_t frames() const { return folder_.images.entries.size(); }
 
  private:
@@ -53,7 +50,7 @@ class ThermalFolderSource final : public OfflineSource {
   std::size_t next_frame_ = 0;
   std::optional<OfflineMessage> cloud_;  // read ahead
   std::optional<Steady::time_point> handed_out_;
-  std::vector<Timing> timing_;
+  std::vector<FileTiming> timing_;
 };
 
 }  // namespace adit
