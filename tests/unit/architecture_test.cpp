@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 // What every component may include besides itself: the runtime, and plain libraries that know neither it nor
 // middleware.
-const std::set<std::string> plain_libraries = {"geometry", "config", "dataset"};
+const std::set<std::string> plain_libraries = {"geometry", "config", "dataset", "pose_graph"};
 // Components whose algorithm is a library of its own: only the adapter (a file named *component*) knows the framework.
 const std::set<std::string> algorithm_folders = {"lidar_odometry", "thermal_odometry", "state_estimator",
                                                  "tunnel_simulator"};
