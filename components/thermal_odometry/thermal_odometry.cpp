@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <Eigen/Cholesky>
 
 #include "components/thermal_odometry/cloud_buffer.hpp"
+#include "components/thermal_odometry/frame_aligner.hpp"
 
 namespace adit::thermal_odometry {
 namespace {
@@ -31,7 +31,8 @@ class ThermalOdometry::Engine {
         height_(camera.height),
         gate_(camera, config.gate),
         front_end_(camera, config.front_end),
-        mapper_(camera, Pyramid::max_levels, config.mapper) {
+        mapper_(camera, Pyramid::max_levels, config.mapper),
+        aligner_(config.aligner) {
     current_.allocate(width_, height_);
     const auto capacity = static_cast<std::size_t>(4 * std::max(config.mapper.selection.wanted, 200) + 400);
     tracker_ = std::make_unique<Tracker>(pinhole_, current_.levels(), capacity, config.tracker);
@@ -63,8 +64,8 @@ class ThermalOdometry::Engine {
 
   void reset() {
     restart();
-    T_cw_ = Pose::Identity();
-    last_stamp_ns_ = 0;
+    aligner_.place(0, Pose::Identity());
+    last_frame_ns_ = 0;
     out_.T_odom_camera = Pose::Identity();
   }
 
@@ -77,7 +78,7 @@ class ThermalOdometry::Engine {
     for (const WindowPoint& point : window.points()) {
       if (n == out.size()) break;
       const Patch& patch = point.patch;
-      const Warp warp(window.keyframe(patch.host).state, {T_cw_, 0.0, 0.0}, pinhole_);
+      const Warp warp(window.keyframe(patch.host).state, {aligner_.T_cw(), 0.0, 0.0}, pinhole_);
       const Eigen::Vector3f X = warp.ray(patch.u, patch.v, patch.inverse_depth);
       if (!(X.z() > 0.05F)) continue;
       const Eigen::Vector2f p = warp.pixel(X);
@@ -108,17 +109,17 @@ class ThermalOdometry::Engine {
     initialiser_->stop();
     map_keyframes_ = 0;
     failures_ = 0;
-    has_velocity_ = false;
+    aligner_.forget_velocity();
     history_.clear();
   }
 
   void initialise(std::int64_t stamp_ns) {
     history_.clear();
-    history_.add(stamp_ns, T_cw_);
+    history_.add(stamp_ns, aligner_.T_cw());
     out_.status = Status::initialising;
     if (lidar()) {
-      const Mapper::Report report =
-          mapper_.add_keyframe(stamp_ns, {T_cw_, 0.0, 0.0}, current_, front_end_.rectifier(), history_, true, 1.5F);
+      const Mapper::Report report = mapper_.add_keyframe(stamp_ns, {aligner_.T_cw(), 0.0, 0.0}, current_,
+                                                         front_end_.rectifier(), history_, true, 1.5F);
       note(report);
       if (!report.textured) out_.status = Status::low_texture;
       if (report.made) {
@@ -130,9 +131,9 @@ class ThermalOdometry::Engine {
   }
 
   void initialise_from_motion(std::int64_t stamp_ns) {
-    if (initialiser_->active() && stamp_ns - last_stamp_ns_ > static_cast<std::int64_t>(3e9 * config_.gap_s))
+    if (initialiser_->active() && stamp_ns - last_frame_ns_ > static_cast<std::int64_t>(3e9 * config_.aligner.gap_s))
       initialiser_->stop();
-    last_stamp_ns_ = stamp_ns;
+    last_frame_ns_ = stamp_ns;
     if (initialiser_->active()) {
       const Initialiser::Outcome outcome = initialiser_->add(current_);
       out_.residual = initialiser_->sigma();
@@ -166,10 +167,10 @@ class ThermalOdometry::Engine {
       patch.inverse_depth *= factor;
       patch.sigma *= factor;
     }
-    const CameraState first{T_cw_, 0.0, 0.0};
+    const CameraState first{aligner_.T_cw(), 0.0, 0.0};
     CameraState second = initialiser_->state();
     second.T_cw.translation() /= static_cast<double>(factor);
-    second.T_cw = second.T_cw * T_cw_;
+    second.T_cw = second.T_cw * first.T_cw;
     const Mapper::Report report =
         mapper_.start(initialiser_->stamp_ns(), first, initialiser_->first_image(), patches, stamp_ns, second, current_,
                       front_end_.rectifier(), initialiser_->sigma());
@@ -178,9 +179,8 @@ class ThermalOdometry::Engine {
       mapper_.clear();
       return false;
     }
-    const Vector6d moved = se3_log(mapper_.newest().state.T_cw * T_cw_.inverse());
-    velocity_ = moved / std::max(1e-3, seconds(stamp_ns - initialiser_->stamp_ns()));
-    has_velocity_ = true;
+    const Vector6d moved = se3_log(mapper_.newest().state.T_cw * first.T_cw.inverse());
+    aligner_.set_velocity(moved / std::max(1e-3, seconds(stamp_ns - initialiser_->stamp_ns())));
     if (out_.scale == ScaleState::metric) out_.scale = ScaleState::carried;
     if (out_.scale == ScaleState::carried) out_.log_scale_sigma = std::hypot(out_.log_scale_sigma, 0.05);
     initialiser_->stop();
@@ -195,15 +195,9 @@ class ThermalOdometry::Engine {
     map_keyframes_ = 1;
     ++out_.counters.keyframes;
     mapper_.set_reference(*tracker_);
-    T_cw_ = mapper_.newest().state.T_cw;
-    last_a_ = mapper_.newest().state.a;
-    last_b_ = mapper_.newest().state.b;
-    last_stamp_ns_ = stamp_ns;
+    aligner_.begin_at(stamp_ns, mapper_.newest().state);
     history_.clear();
-    history_.add(stamp_ns, T_cw_);
-    out_.T_odom_camera = T_cw_.inverse();
-    out_.keyframe_stamp_ns = stamp_ns;
-    out_.T_keyframe_camera = Pose::Identity();
+    note_keyframe(stamp_ns);
   }
 
   void note(const Mapper::Report& report) {
@@ -234,102 +228,48 @@ class ThermalOdometry::Engine {
     ++out_.counters.keyframes;
     out_.new_keyframe = true;
     mapper_.set_reference(*tracker_);
-    const Keyframe& newest = mapper_.newest();
-    T_cw_ = newest.state.T_cw;
-    last_a_ = newest.state.a;
-    last_b_ = newest.state.b;
+    aligner_.correct(mapper_.newest().state);
     if (report.log_scale_correction != 0.0) {
-      velocity_.head<3>() *= std::exp(report.log_scale_correction);
+      aligner_.rescale(std::exp(report.log_scale_correction));
       history_.clear();
-      history_.add(stamp_ns, T_cw_);
     }
-    out_.T_odom_camera = T_cw_.inverse();
+    note_keyframe(stamp_ns);
+  }
+
+  // The newest frame is the newest keyframe: poses are said relative to it from now on.
+  void note_keyframe(std::int64_t stamp_ns) {
+    if (history_.size() == 0) history_.add(stamp_ns, aligner_.T_cw());
+    out_.T_odom_camera = aligner_.T_cw().inverse();
     out_.keyframe_stamp_ns = stamp_ns;
     out_.T_keyframe_camera = Pose::Identity();
   }
 
   void track(std::int64_t stamp_ns, const Prior* prior) {
-    const double dt = seconds(stamp_ns - last_stamp_ns_);
-    const bool gap = dt > config_.gap_s;
     const Keyframe& reference = mapper_.newest();
-    Vector6d predicted_twist = Vector6d::Zero();
-    if (has_velocity_) predicted_twist = velocity_ * dt;
-    const Pose constant_velocity = se3_exp(predicted_twist) * T_cw_;
-
-    std::array<Pose, 3> starts{constant_velocity, T_cw_, T_cw_};
-    int count = has_velocity_ && gap ? 2 : 1;
-    Tracker::PosePrior pose_prior;
-    const bool prior_usable =
-        prior != nullptr && prior->T_previous_current.matrix().allFinite() && prior->covariance.allFinite();
-    if (prior_usable) {
-      pose_prior.T_cw = prior->T_previous_current.inverse() * T_cw_;
-      // T_previous_current exp-left-increment covariance, carried to the left increment of T_cw.
-      const Matrix6d adjoint = se3_adjoint(prior->T_previous_current.inverse());
-      const Matrix6d covariance = adjoint * prior->covariance * adjoint.transpose() + 1e-12 * Matrix6d::Identity();
-      pose_prior.information = covariance.ldlt().solve(Matrix6d::Identity());
-      starts[static_cast<std::size_t>(count++)] = pose_prior.T_cw;
-    }
-    const int top = gap ? Pyramid::max_levels - 1 : 3;
-    CameraState start{constant_velocity, last_a_, last_b_};
-    Tracker::Before before{T_cw_, dt, Vector6d::Zero()};
-    if (has_velocity_ && !gap) before.rate_change = velocity_change_;
-    if (gap) start.a = reference.state.a;
-    double best_cost = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < count && count > 1; ++i) {
-      CameraState candidate = start;
-      candidate.T_cw = starts[static_cast<std::size_t>(i)];
-      const double cost = tracker_->cost(current_, candidate, std::min(top, current_.levels() - 1));
-      if (cost < best_cost) {
-        best_cost = cost;
-        start.T_cw = candidate.T_cw;
-      }
-    }
-    const Tracker::PosePrior* information = prior_usable && config_.prior_as_information ? &pose_prior : nullptr;
-    TrackResult result = tracker_->track(current_, start, top, information, &before);
-    if (!result.ok) result = search(start, information, before);
+    const FrameAligner::Alignment alignment = aligner_.align(*tracker_, current_, stamp_ns, reference.state.a, prior);
+    const TrackResult& result = alignment.result;
     report(result);
     if (!result.ok) {
       // Residuals like noise, but nothing in them that both images have: there is no texture to be lost.
       const bool empty = result.inlier_share > 0.8F && result.correlation < 0.5F * config_.tracker.min_correlation;
-      fail(stamp_ns, constant_velocity, empty ? Status::low_texture : Status::recovering);
+      fail(stamp_ns, alignment.predicted, empty ? Status::low_texture : Status::recovering);
       return;
     }
-    accept(stamp_ns, dt, result);
-    const bool anchored = out_.scale == ScaleState::metric;
-    const double age = seconds(stamp_ns - reference.stamp_ns);
-    const double min_age = anchored ? config_.anchored_keyframe_age_s : config_.mono_keyframe_age_s;
-    const double flow = anchored ? config_.anchored_keyframe_flow : config_.mono_keyframe_flow;
-    const double visible = anchored ? config_.anchored_visible_share : config_.mono_visible_share;
-    const bool moved_on = result.median_flow > flow * width_ || result.visible_share < visible ||
-                          (age > config_.max_keyframe_age_s && (anchored || result.median_flow > 0.3 * flow * width_));
-    const bool young_map = anchored && map_keyframes_ < 4;
-    const bool vanishing = age >= config_.young_keyframe_age_s && result.visible_share < 0.67 * visible;
-    if (gap || young_map || vanishing || (age >= min_age && moved_on)) make_keyframe(stamp_ns, result);
+    accept(stamp_ns, result);
+    if (alignment.gap || moved_on(stamp_ns, result)) make_keyframe(stamp_ns, result);
   }
 
-  // Small rotations about the start, from the coarsest level: only after a failure.
-  TrackResult search(const CameraState& start, const Tracker::PosePrior* prior, const Tracker::Before& before) {
-    TrackResult best;
-    const int top = current_.levels() - 1;
-    double best_cost = std::numeric_limits<double>::infinity();
-    CameraState best_start = start;
-    for (int i = 0; i < 27; ++i) {
-      const Eigen::Vector3d axis(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-      for (double angle : {0.03, 0.07}) {
-        CameraState candidate = start;
-        candidate.T_cw = Pose(so3_exp(angle * axis)) * start.T_cw;
-        const double cost = tracker_->cost(current_, candidate, top);
-        if (cost < best_cost) {
-          best_cost = cost;
-          best_start = candidate;
-        }
-      }
-    }
-    if (std::isfinite(best_cost)) best = tracker_->track(current_, best_start, top, prior, &before);
-    if (best.ok) return best;
-    CameraState still = start;
-    still.T_cw = T_cw_;
-    return tracker_->track(current_, still, top, prior, &before);
+  bool moved_on(std::int64_t stamp_ns, const TrackResult& result) const {
+    const bool anchored = out_.scale == ScaleState::metric;
+    const double age = seconds(stamp_ns - mapper_.newest().stamp_ns);
+    const double min_age = anchored ? config_.anchored_keyframe_age_s : config_.mono_keyframe_age_s;
+    const double flow = (anchored ? config_.anchored_keyframe_flow : config_.mono_keyframe_flow) * width_;
+    const double visible = anchored ? config_.anchored_visible_share : config_.mono_visible_share;
+    const bool moved = result.median_flow > flow || result.visible_share < visible ||
+                       (age > config_.max_keyframe_age_s && (anchored || result.median_flow > 0.3 * flow));
+    const bool young_map = anchored && map_keyframes_ < 4;
+    const bool vanishing = age >= config_.young_keyframe_age_s && result.visible_share < 0.67 * visible;
+    return young_map || vanishing || (age >= min_age && moved);
   }
 
   void report(const TrackResult& result) {
@@ -341,29 +281,21 @@ class ThermalOdometry::Engine {
     out_.flow = result.median_flow;
   }
 
-  void accept(std::int64_t stamp_ns, double dt, const TrackResult& result) {
+  void accept(std::int64_t stamp_ns, const TrackResult& result) {
     const Keyframe& reference = mapper_.newest();
-    const Pose T_current_previous = result.state.T_cw * T_cw_.inverse();
+    const Pose T_current_previous = result.state.T_cw * aligner_.T_cw().inverse();
     if (failures_ == 0) {
-      out_.previous_stamp_ns = last_stamp_ns_;
+      out_.previous_stamp_ns = aligner_.stamp_ns();
       out_.T_previous_camera = T_current_previous.inverse();
     }
-    const Vector6d velocity = se3_log(T_current_previous) / dt;
-    velocity_change_.setZero();
-    if (has_velocity_ && dt < config_.gap_s) velocity_change_ = 0.5 * (velocity - velocity_);
-    velocity_ = velocity;
-    has_velocity_ = true;
-    T_cw_ = result.state.T_cw;
-    last_a_ = result.state.a;
-    last_b_ = result.state.b;
-    last_stamp_ns_ = stamp_ns;
+    aligner_.move_to(stamp_ns, result.state);
     failures_ = 0;
-    history_.add(stamp_ns, T_cw_);
+    history_.add(stamp_ns, aligner_.T_cw());
     ++out_.counters.tracked;
 
     out_.status = Status::tracking;
     out_.measured = true;
-    out_.T_odom_camera = T_cw_.inverse();
+    out_.T_odom_camera = aligner_.T_cw().inverse();
     out_.keyframe_stamp_ns = reference.stamp_ns;
     out_.T_keyframe_camera = reference.state.T_cw * out_.T_odom_camera;
     out_.information = result.information;
@@ -390,8 +322,8 @@ class ThermalOdometry::Engine {
     if (failures_ < config_.restart_after) return;
     ++out_.counters.restarts;
     restart();
-    if (predicted.matrix().allFinite()) T_cw_ = predicted;
-    last_stamp_ns_ = stamp_ns;
+    aligner_.place(stamp_ns, predicted.matrix().allFinite() ? predicted : aligner_.T_cw());
+    last_frame_ns_ = stamp_ns;
   }
 
   Config config_;
@@ -410,13 +342,8 @@ class ThermalOdometry::Engine {
   float carried_inverse_depth_ = 0.0F;
 
   bool tracking_ = false;
-  Pose T_cw_ = Pose::Identity();
-  double last_a_ = 0.0;
-  double last_b_ = 0.0;
-  std::int64_t last_stamp_ns_ = 0;
-  Vector6d velocity_ = Vector6d::Zero();         // mean of the last interval
-  Vector6d velocity_change_ = Vector6d::Zero();  // from the middle of an interval to its end
-  bool has_velocity_ = false;
+  FrameAligner aligner_;
+  std::int64_t last_frame_ns_ = 0;  // while the map is being started
   int failures_ = 0;
   Estimate out_;
 };

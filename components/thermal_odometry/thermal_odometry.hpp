@@ -11,6 +11,7 @@
 
 #include "components/thermal_odometry/estimate.hpp"
 #include "components/thermal_odometry/frame.hpp"
+#include "components/thermal_odometry/frame_aligner.hpp"
 #include "components/thermal_odometry/front_end.hpp"
 #include "components/thermal_odometry/initialiser.hpp"
 #include "components/thermal_odometry/mapper.hpp"
@@ -29,6 +30,7 @@ struct Config {
   FrameGate::Config gate;
   FrontEnd::Config front_end;
   Tracker::Config tracker;
+  FrameAligner::Config aligner;
   Mapper::Config mapper;
   Initialiser::Config initialiser;
   // When a frame becomes a keyframe: old enough, and flow, visibility or age say so. Few with LiDAR depth (every
@@ -41,9 +43,7 @@ struct Config {
   double anchored_visible_share = 0.5;
   double mono_visible_share = 0.6;
   double young_keyframe_age_s = 0.1;  // at least, when less than two thirds of the visible share are left
-  double gap_s = 0.1;                 // longer since the last frame: start coarser, new keyframe
   int restart_after = 5;              // frames that could not be aligned
-  bool prior_as_information = false;  // besides starting there: add the prior to the normal equations (paper R63)
   double usual_depth = 1.0;           // median depth a monocular map starts with: its unit of length
   double correlation = 10.0;          // of residuals: covariance = correlation * inverse photometric information
 };

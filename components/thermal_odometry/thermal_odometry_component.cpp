@@ -157,7 +157,7 @@ Result<void> ThermalOdometryComponent::calibrate(const thermal_odometry::CameraM
   config.mapper.selection.wanted = static_cast<int>(wanted_points_.value());
   config.front_end.bilateral = bilateral_;
   config.usual_depth = usual_depth_;
-  config.prior_as_information = prior_as_information_;
+  config.aligner.prior_as_information = prior_as_information_;
   auto engine = thermal_odometry::ThermalOdometry::create(camera, config);
   if (!engine) return engine.error();
   engine_ = std::move(*engine);
