@@ -11,6 +11,10 @@ int main(int argc, char** argv) {
   adit::add_node_command(app, code);
   adit::add_doctor_command(app, code);
   adit::add_explain_command(app, code);
+#ifdef ADIT_HAS_RECORDING
+  adit::add_record_command(app, code);
+  adit::add_play_command(app, code);
+#endif
 #ifdef ADIT_HAS_STACK
   adit::add_evaluate_command(app, code);
   adit::add_odometry_command(app, code);

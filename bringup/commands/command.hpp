@@ -21,6 +21,8 @@ void add_odometry_command(CLI::App& app, ExitCode& code);
 void add_thermal_odometry_command(CLI::App& odometry, ExitCode& code);
 void add_evaluate_command(CLI::App& app, ExitCode& code);
 void add_simulate_command(CLI::App& app, ExitCode& code);
+void add_record_command(CLI::App& app, ExitCode& code);
+void add_play_command(CLI::App& app, ExitCode& code);
 void add_topic_command(CLI::App& app, ExitCode& code);
 void add_node_command(CLI::App& app, ExitCode& code);
 void add_doctor_command(CLI::App& app, ExitCode& code);

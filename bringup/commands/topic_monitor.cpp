@@ -1,15 +1,9 @@
 #include "bringup/commands/topic_monitor.hpp"
 
-#include <csignal>
-
 #include "bringup/commands/graph_table.hpp"
+#include "bringup/commands/interrupt.hpp"
 
 namespace adit {
-namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
-
-}  // namespace
 
 Qos matching_qos(const std::vector<EndpointInfo>& writers) {
   Qos qos = Qos::sensor();
@@ -99,8 +93,7 @@ Result<std::unique_ptr<TopicMonitor>> TopicMonitor::open(const ParticipantConfig
 }
 
 void TopicMonitor::run(std::optional<Duration> limit, const std::function<bool(const Sample&)>& handle) {
-  interrupted = 0;
-  auto* const previous = std::signal(SIGINT, [](int) { interrupted = 1; });
+  const Interrupt interrupt;
   reader_->on_data([this] {
     const std::lock_guard lock(mutex_);
     ready_ = true;
@@ -108,7 +101,7 @@ void TopicMonitor::run(std::optional<Duration> limit, const std::function<bool(c
   });
   const auto end = std::chrono::steady_clock::now() + limit.value_or(std::chrono::hours(24 * 365));
   bool wanted = true;
-  while (wanted && !interrupted && std::chrono::steady_clock::now() < end) {
+  while (wanted && !interrupt.requested() && std::chrono::steady_clock::now() < end) {
     {
       std::unique_lock lock(mutex_);
       // Short waits, because a signal does not wake a condition variable.
@@ -120,7 +113,6 @@ void TopicMonitor::run(std::optional<Duration> limit, const std::function<bool(c
     while (wanted && reader_->take({&sample, 1}) == 1) wanted = handle(sample);
   }
   reader_->on_data(nullptr);
-  std::signal(SIGINT, previous);
 }
 
 }  // namespace adit

@@ -31,8 +31,8 @@ class TopicMonitor {
   static Result<std::unique_ptr<TopicMonitor>> open(const ParticipantConfig& config, const std::string& topic,
                                                     Duration discovery);
 
-  // Hands each sample to `handle` in order, on the calling thread, until it returns false, the time is over or SIGINT
-  // arrives. Sleeps between samples.
+  // Hands each sample to `handle` in order, on the calling thread, until it returns false, the time is over, or
+  // SIGINT or SIGTERM arrives. Sleeps between samples.
   void run(std::optional<Duration> limit, const std::function<bool(const Sample&)>& handle);
 
   const std::string& type() const { return type_; }  // ROS name

@@ -9,6 +9,7 @@
 
 #include "bringup/offline/progress.hpp"
 #include "bringup/offline/scenario_description.hpp"
+#include "components/dataset/bag_qos.hpp"
 #include "components/dataset/bag_writer.hpp"
 
 namespace adit::offline {
@@ -57,7 +58,7 @@ class Recorder {
       dataset::BagTopic topic;
       topic.name = port.topic;
       topic.type = port.type->ros_name;
-      topic.qos = dataset::bag_qos(10, false);
+      topic.qos = dataset::bag_qos(Qos::reliable(10));
       topic.type_hash = port.type->type_hash;
       topic.schema = port.type->schema;
       const Result<std::size_t> index = writer_->add_topic(topic);

@@ -12,13 +12,10 @@ namespace adit::dataset {
 struct BagTopic {
   std::string name;       // "/lidar/points"
   std::string type;       // ROS name: "sensor_msgs/msg/PointCloud2"
-  std::string qos;        // YAML list of the offered profiles, rosbag2's text; may be empty
+  std::string qos;        // YAML list of the offered profiles, rosbag2's text (bag_qos.hpp); may be empty
   std::string type_hash;  // RIHS01_...; empty when the bag does not say
   std::string schema;     // ros2msg text with its dependencies; empty when the bag does not say
 };
-
-// The profile of one writer as rosbag2 writes it down: keep last `depth`, reliable; `latched`: transient local.
-std::string bag_qos(int depth, bool latched);
 
 // A sample of a bag. `cdr` starts with the 4-byte encapsulation header; see where it comes from for how long it is
 // valid.

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "components/dataset/bag_qos.hpp"
 #include "components/dataset/bag_reader.hpp"
 #include "components/dataset/bag_writer.hpp"
 
@@ -39,8 +40,10 @@ class Bag : public ::testing::Test {
   }
 };
 
-const BagTopic kPoints{"/lidar/points", "sensor_msgs/msg/PointCloud2", bag_qos(10, false), "RIHS01_aa", "uint32 x\n"};
-const BagTopic kRig{"/tf_static", "tf2_msgs/msg/TFMessage", bag_qos(1, true), "RIHS01_bb", "string \"quoted\" \\ text"};
+const BagTopic kPoints{"/lidar/points", "sensor_msgs/msg/PointCloud2", bag_qos(Qos::reliable(10)), "RIHS01_aa",
+                       "uint32 x\n"};
+const BagTopic kRig{"/tf_static", "tf2_msgs/msg/TFMessage", bag_qos(Qos::latched()), "RIHS01_bb",
+                    "string \"quoted\" \\ text"};
 
 // Two topics, samples out of order, one of 3 MB.
 void write_bag(const std::string& folder, int seed, const std::vector<std::byte>& large,
@@ -118,6 +121,63 @@ TEST_F(Bag, SameCallsSameBytes) {
   EXPECT_EQ(read(path("a/run/run_0.db3")), read(path("b/run/run_0.db3")));
   EXPECT_EQ(read(path("a/run/metadata.yaml")), read(path("b/run/metadata.yaml")));
   EXPECT_NE(read(path("a/run/run_0.db3")), read(path("c/run/run_0.db3")));
+}
+
+// The files as they are while the recording goes on, in another folder: what a power cut would leave.
+TEST_F(Bag, CommittedSamplesOutliveTheirWriter) {
+  auto writer = BagWriter::create(path("run"), BagWriter::Safety::each_commit);
+  ASSERT_TRUE(writer) << writer.error().message;
+  const std::size_t points = *(*writer)->add_topic(kPoints);
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE((*writer)->write({points, i, payload(100'000, i)}));
+  ASSERT_TRUE((*writer)->commit());
+  ASSERT_TRUE((*writer)->write({points, 20, payload(100'000, 20)}));  // not committed
+  fs::copy(path("run"), path("cut"));
+  auto cut = BagReader::open(path("cut"));
+  ASSERT_TRUE(cut) << cut.error().message;
+  EXPECT_EQ((*cut)->info().samples, 20U);
+  BagSample sample;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(*(*cut)->next(sample));
+    EXPECT_TRUE(std::ranges::equal(sample.cdr, payload(100'000, i)));
+  }
+  ASSERT_TRUE((*writer)->close());
+  auto whole = BagReader::open(path("run"));
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_EQ((*whole)->info().samples, 21U);
+  std::vector<std::string> files;
+  for (const auto& entry : fs::directory_iterator(path("run"))) files.push_back(entry.path().filename().string());
+  EXPECT_THAT(files, testing::UnorderedElementsAre("metadata.yaml", "run_0.db3"));
+}
+
+TEST(BagQos, SurvivesTheText) {
+  for (const Qos& qos : {Qos::sensor(), Qos::reliable(7), Qos::latched(), Qos::clock(), Qos::tf(), Qos::reliable(0)}) {
+    const Result<Qos> read = bag_qos_offer(bag_qos(qos));
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(*read, qos) << to_string(qos);
+  }
+  EXPECT_EQ(bag_qos_offer(bag_qos(Qos::rosout()))->lifespan, std::nullopt);  // offered for good: see the header
+}
+
+TEST(BagQos, OffersWhatServesTheReadersOfEveryWriter) {
+  const auto offer = bag_qos_offer(bag_qos(Qos::sensor()) + "\n" + bag_qos(Qos::latched(3)));
+  ASSERT_TRUE(offer) << offer.error().message;
+  for (const Qos& asked : {Qos::sensor(), Qos::latched(3)}) EXPECT_TRUE(check(*offer, asked).empty());
+  EXPECT_EQ(offer->depth, 5U);
+}
+
+TEST(BagQos, ReadsWordsAndRefusesNonsense) {
+  const auto words = bag_qos_offer(
+      "- history: keep_all\n  depth: 0\n  reliability: best_effort\n  durability: transient_local\n  liveliness: "
+      "automatic");
+  ASSERT_TRUE(words) << words.error().message;
+  EXPECT_EQ(words->depth, 0U);
+  EXPECT_EQ(words->reliability, Qos::Reliability::best_effort);
+  EXPECT_EQ(words->durability, Qos::Durability::transient_local);
+  EXPECT_EQ(*bag_qos_offer(""), Qos::reliable(10));
+  EXPECT_EQ(*bag_qos_offer("[]"), Qos::reliable(10));
+  EXPECT_FALSE(bag_qos_offer("- depth: many"));
+  EXPECT_FALSE(bag_qos_offer("reliable"));
+  EXPECT_FALSE(bag_qos_offer("- {"));
 }
 
 TEST_F(Bag, RefusesWhatIsNotABag) {

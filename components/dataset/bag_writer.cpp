@@ -51,16 +51,6 @@ std::string indented(const std::string& text) {
 
 }  // namespace
 
-std::string bag_qos(int depth, bool latched) {
-  // rmw's numbers: history 1 keep last; reliability 1 reliable; durability 1 transient local, 2 volatile; liveliness 1
-  // automatic. Durations without limit are the greatest int64 of nanoseconds.
-  return "- history: 1\n  depth: " + std::to_string(depth) +
-         "\n  reliability: 1\n  durability: " + (latched ? "1" : "2") +
-         "\n  deadline:\n    sec: 9223372036\n    nsec: 854775807\n  lifespan:\n    sec: 9223372036\n    nsec: "
-         "854775807\n  liveliness: 1\n  liveliness_lease_duration:\n    sec: 9223372036\n    nsec: 854775807\n  "
-         "avoid_ros_namespace_conventions: false";
-}
-
 struct BagWriter::Impl {
   std::string folder, file_name;
   SqliteFile file;
@@ -70,6 +60,7 @@ struct BagWriter::Impl {
   std::uint64_t pending_bytes = 0, pending_samples = 0, total = 0;
   std::int64_t first = std::numeric_limits<std::int64_t>::max();
   std::int64_t last = std::numeric_limits<std::int64_t>::min();
+  Safety safety = Safety::on_close;
   bool closed = false;
 
   Impl(std::string to_folder, std::string name, SqliteFile to_file)
@@ -112,7 +103,7 @@ BagWriter::~BagWriter() {
   (void)close();
 }
 
-Result<std::unique_ptr<BagWriter>> BagWriter::create(const std::string& folder) {
+Result<std::unique_ptr<BagWriter>> BagWriter::create(const std::string& folder, Safety safety) {
   const std::filesystem::path path = std::filesystem::absolute(folder).lexically_normal();
   const std::string name = (path.has_filename() ? path : path.parent_path()).filename().string();
   std::error_code failed;
@@ -124,8 +115,12 @@ Result<std::unique_ptr<BagWriter>> BagWriter::create(const std::string& folder) 
   if (!file) return file.error();
   std::unique_ptr<BagWriter> writer(new BagWriter(std::make_unique<Impl>(path.string(), file_name, *std::move(file))));
   Impl& d = *writer->impl_;
-  // Nothing is at stake before close(): no waiting for the disk.
-  if (auto made = d.file.execute("PRAGMA synchronous = OFF; BEGIN;" + std::string(kTables)); !made) return made.error();
+  d.safety = safety;
+  // A write-ahead log that waits for the disk when it is merged: what was committed outlives a power cut. Otherwise
+  // nothing is at stake before close().
+  const std::string mode = safety == Safety::each_commit ? "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"
+                                                         : "PRAGMA synchronous = OFF;";
+  if (auto made = d.file.execute(mode + " BEGIN;" + kTables); !made) return made.error();
   if (auto row = d.add_row("INSERT INTO schema VALUES (?, ?)", 4, kDistribution); !row) return row.error();
   auto insert = d.file.prepare("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)");
   if (!insert) return insert.error();
@@ -181,6 +176,12 @@ Result<void> BagWriter::write(const BagSample& sample) {
   d.last = std::max(d.last, sample.stamp_ns);
   d.pending_bytes += sample.cdr.size();
   if (++d.pending_samples < kSamplesEvery && d.pending_bytes < kBytesEvery) return {};
+  return commit();
+}
+
+Result<void> BagWriter::commit() {
+  Impl& d = *impl_;
+  if (d.closed) return {};
   d.pending_bytes = d.pending_samples = 0;
   return d.file.execute("COMMIT; BEGIN");
 }
@@ -193,7 +194,9 @@ Result<void> BagWriter::close() {
   d.insert.reset();
   if (auto row = d.add_row("INSERT INTO metadata (metadata_version, metadata) VALUES (?, ?)", 8, text); !row)
     return row;
-  if (auto committed = d.file.execute("COMMIT"); !committed) return committed;
+  // Leaving the log's mode merges it: the bag is one file again, as a reader without write access needs it.
+  const char* end = d.safety == Safety::each_commit ? "COMMIT; PRAGMA journal_mode = DELETE" : "COMMIT";
+  if (auto committed = d.file.execute(end); !committed) return committed;
   const std::string path = d.folder + "/metadata.yaml";
   std::ofstream out(path, std::ios::trunc);
   out << "rosbag2_bagfile_information:\n" << indented(text);

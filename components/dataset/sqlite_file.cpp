@@ -60,7 +60,7 @@ Result<SqliteFile> SqliteFile::open_readonly(const std::string& path) {
 Result<SqliteFile> SqliteFile::create(const std::string& path) {
   std::error_code ignored;
   std::filesystem::remove(path, ignored);
-  std::filesystem::remove(path + "-journal", ignored);
+  for (const char* left_over : {"-journal", "-wal", "-shm"}) std::filesystem::remove(path + left_over, ignored);
   sqlite3* database = nullptr;
   const int status = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
   SqliteFile file(database, path);

@@ -42,7 +42,8 @@ class SqliteStatement {
 // One thread at a time. Statements must not outlive it.
 class SqliteFile {
  public:
-  // Reads an existing file without ever writing to it, or to its folder.
+  // Reads an existing file without ever writing to it. A file whose writer was killed is read with the log it left; that
+  // needs a folder that can be written to.
   static Result<SqliteFile> open_readonly(const std::string& path);
   // A new, empty file; one that exists is replaced.
   static Result<SqliteFile> create(const std::string& path);

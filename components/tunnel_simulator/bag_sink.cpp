@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "adit_msgs/msg/thermal_frame.hpp"
+#include "components/dataset/bag_qos.hpp"
 #include "components/tunnel_simulator/sensor_messages.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/camera_info.hpp"
@@ -46,7 +47,8 @@ Result<std::unique_ptr<BagSink>> BagSink::create(const std::string& folder, cons
 template <class Message>
 void BagSink::write(const std::string& topic, const Message& message, std::int64_t stamp_ns, bool latched) {
   const TypeInfo& type = type_info<Message>();
-  const auto index = writer_->add_topic({topic, std::string(type.ros_name), dataset::bag_qos(latched ? 1 : 10, latched),
+  const auto index = writer_->add_topic({topic, std::string(type.ros_name),
+                                         dataset::bag_qos(latched ? Qos::latched() : Qos::reliable(10)),
                                          std::string(type.type_hash), std::string(type.schema)});
   if (!index) {
     error_ = index.error();

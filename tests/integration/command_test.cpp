@@ -81,6 +81,38 @@ TEST_P(Commands, ExplainAndDoctorLookAtThisMachine) {
   EXPECT_THAT(doctor.text, HasSubstr(std::string("ok    middleware ") + GetParam()));
 }
 
+// A recording of a running deployment, heard again from the bag alone; a recording that is killed is a bag all the
+// same.
+TEST_P(Commands, RecordedTopicsPlayAgain) {
+  const std::string bag = folder_.file("bag"), killed_bag = folder_.file("killed");
+  {
+    Background run(with_options({"run", folder_.write("talk.yaml", talking), "--quiet"}), folder_.file("log"));
+    Background killed(with_options({"record", "/chatter", "--out", killed_bag}), folder_.file("killed_log"));
+    // Long enough to be discovered on a loaded machine.
+    const Output recorded = run_adit(with_options({"record", "--all", "--out", bag, "--duration", "8"}));
+    EXPECT_EQ(recorded.exit_code, 0) << recorded.text;
+    EXPECT_THAT(recorded.text, HasSubstr("/chatter"));
+    EXPECT_THAT(recorded.text, HasSubstr("/diagnostics"));
+    killed.signal(SIGKILL);
+    EXPECT_NE(killed.wait(5.0), -1);
+    const Output again = run_adit(with_options({"record", "/chatter", "--out", bag}));
+    EXPECT_EQ(again.exit_code, 1);
+    EXPECT_THAT(again.text, HasSubstr("exists"));
+    run.signal(SIGINT);
+    EXPECT_EQ(run.wait(20.0), 0);
+  }
+  for (const std::string& recording : {bag, killed_bag}) {
+    Background play(with_options({"play", recording, "--topic", "/chatter", "--remap", "/chatter:=/again", "--loop"}),
+                    folder_.file("play_log"));
+    const Output echo =
+        run_adit(with_options({"topic", "echo", "/again", "-n", "3", "--wait", "20", "--duration", "20"}));
+    EXPECT_EQ(echo.exit_code, 0) << echo.text;
+    EXPECT_THAT(echo.text, HasSubstr("Hello World"));
+    play.signal(SIGINT);
+    EXPECT_EQ(play.wait(20.0), 0);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Vendors, Commands, testing::Values("fastdds", "cyclonedds"),
                          [](const auto& vendor) { return std::string(vendor.param); });
 
