@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <ctime>
 #include <exception>
+#include <utility>
 
 #include "components/runtime/log_sink.hpp"
 
@@ -58,8 +59,7 @@ std::string_view to_string(Health health) {
   return names[static_cast<std::size_t>(health)];
 }
 
-// --- Names, parameters
-// -------------------------------------------------------------------------------------------------
+// --- Names, parameters ---
 
 Result<void> ComponentCore::bind(const ComponentConfig& config, std::shared_ptr<LogSink> sink) {
   type_ = config.type;
@@ -128,8 +128,7 @@ std::vector<ParamInfo> ComponentCore::parameters() const {
   return parameters;
 }
 
-// --- Lifecycle
-// ---------------------------------------------------------------------------------------------------------
+// --- Lifecycle ---
 
 void ComponentCore::connect(const Environment& environment) {
   environment_ = environment;
@@ -249,8 +248,7 @@ void ComponentCore::fail(const std::string& what) {
   if (environment_.on_failure) environment_.on_failure(*this, reason);
 }
 
-// --- Running
-// -----------------------------------------------------------------------------------------------------------
+// --- Running ---
 
 void ComponentCore::wake() {
   if (connected_) environment_.scheduler->schedule(*this);
@@ -289,7 +287,12 @@ bool ComponentCore::run_one() {
     }
     if (const Duration::rep jump = pending_jump_.exchange(0); jump != 0) component_.on_time_jump(Duration(jump));
     for (InputBase* input : inputs_) input->drain_reader();
-    if (!fire_due_timer() && !run_raised_trigger()) handle_next_message();
+    // After a timer or trigger a waiting message has its turn, so that one that takes longer than its period starves
+    // nobody.
+    if (!std::exchange(message_turn_, false) || !handle_next_message()) {
+      message_turn_ = fire_due_timer() || run_raised_trigger();
+      if (!message_turn_) handle_next_message();
+    }
     more = more_to_do();
   } catch (const std::exception& exception) {
     fail(std::string("threw an exception: ") + exception.what());
@@ -306,12 +309,11 @@ bool ComponentCore::run_one() {
 bool ComponentCore::fire_due_timer() {
   if (timers_.empty()) return false;
   const Duration::rep now = timer_now();
-  for (Timer* timer : timers_) {
-    if (!timer->due(now)) continue;
-    timer->fire(now, clock().now());
-    return true;
-  }
-  return false;
+  Timer* const first = *std::min_element(timers_.begin(), timers_.end(),
+                                         [](const Timer* a, const Timer* b) { return a->next_ < b->next_; });
+  if (!first->due(now)) return false;
+  first->fire(now, clock().now());
+  return true;
 }
 
 bool ComponentCore::run_raised_trigger() {
@@ -323,7 +325,7 @@ bool ComponentCore::run_raised_trigger() {
   return false;
 }
 
-void ComponentCore::handle_next_message() {
+bool ComponentCore::handle_next_message() {
   InputBase* first = nullptr;
   {
     const std::lock_guard lock(queue_mutex_);
@@ -336,6 +338,7 @@ void ComponentCore::handle_next_message() {
     }
   }
   if (first) first->handle_next();
+  return first != nullptr;
 }
 
 bool ComponentCore::more_to_do() {
@@ -359,8 +362,7 @@ void ComponentCore::set_alarm() {
                                     next == Timer::never ? SteadyTime::max() : SteadyTime(SteadyTime::duration(next)));
 }
 
-// --- Telling
-// -----------------------------------------------------------------------------------------------------------
+// --- Telling ---
 
 void ComponentCore::set_health(Health level, std::string reason) {
   const std::lock_guard lock(health_mutex_);

@@ -95,9 +95,11 @@ class ComponentCore final : public Strand {
 
  private:
   bool run_one() override;
+  // Each runs one handler, if there is something to run: the timer that has been due longest, the first trigger, the
+  // message that arrived first.
   bool fire_due_timer();
   bool run_raised_trigger();
-  void handle_next_message();
+  bool handle_next_message();
   bool more_to_do();
   void set_alarm();
   Result<void> open_ports();
@@ -122,7 +124,8 @@ class ComponentCore final : public Strand {
   std::vector<Timer*> timers_;
   std::vector<Trigger*> triggers_;
 
-  std::mutex running_;  // held while the component's code runs
+  std::mutex running_;         // held while the component's code runs
+  bool message_turn_ = false;  // under running_: a timer or trigger ran last
   std::mutex queue_mutex_;
   std::uint64_t arrivals_ = 0;
   std::atomic<LifecycleState> state_{LifecycleState::unconfigured};

@@ -42,8 +42,7 @@ InputStats InputBase::stats() const {
   return stats;
 }
 
-// --- Lifecycle
-// ---------------------------------------------------------------------------------------------------------
+// --- Lifecycle ---
 
 void InputBase::bind(std::string topic, const Queue& queue, Qos::Reliability reliability) {
   topic_name_ = std::move(topic);
@@ -113,8 +112,7 @@ void InputBase::discard_unread() {
   }
 }
 
-// --- Arrival
-// -----------------------------------------------------------------------------------------------------------
+// --- Arrival ---
 
 void InputBase::offer(const std::shared_ptr<const void>& message, const MessageInfo& info, Duration max_blocking) {
   Waiting dropped;  // destroyed without the lock
@@ -171,8 +169,7 @@ InputBase::Waiting InputBase::pop() {
   return waiting;
 }
 
-// --- In the strand
-// -----------------------------------------------------------------------------------------------------
+// --- In the strand ---
 
 void InputBase::drain_reader() {
   if (!reader_ || !reader_ready_.exchange(false)) return;

@@ -49,8 +49,7 @@ bool OutputBase::wanted_locally() const {
   return latched() || (topic_ && topic_->readers(*this) > 0);
 }
 
-// --- Lifecycle
-// ---------------------------------------------------------------------------------------------------------
+// --- Lifecycle ---
 
 void OutputBase::bind(std::string topic) {
   topic_name_ = std::move(topic);
@@ -94,8 +93,7 @@ void OutputBase::close() {
   pool_.reset();
 }
 
-// --- Publishing
-// --------------------------------------------------------------------------------------------------------
+// --- Publishing ---
 
 bool OutputBase::accepts() {
   if (active_.load(std::memory_order_acquire)) return true;
@@ -141,8 +139,7 @@ bool OutputBase::send(const void* message, const MessageInfo& info) {
   return false;
 }
 
-// --- The local side, called with the topic's lock held
-// -----------------------------------------------------------------
+// --- The local side, called with the topic's lock held ---
 
 void OutputBase::update_local_links(std::span<InputBase* const> inputs) {
   links_.clear();

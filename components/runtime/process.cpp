@@ -53,8 +53,7 @@ Process::~Process() {
   shutdown();
 }
 
-// --- Build
-// -------------------------------------------------------------------------------------------------------------
+// --- Build ---
 
 Result<std::unique_ptr<Process>> Process::build(const ProcessConfig& config) {
   std::unique_ptr<Process> process(new Process);
@@ -98,8 +97,7 @@ std::vector<std::pair<std::string, std::vector<ParamInfo>>> Process::parameters(
   return all;
 }
 
-// --- Start
-// -------------------------------------------------------------------------------------------------------------
+// --- Start ---
 
 Result<void> Process::open() {
   auto participant = adit::open(parts_->config.middleware);
@@ -212,8 +210,7 @@ Result<void> Process::bring(const std::string& name, LifecycleState wanted) {
   return Error{ErrorCode::not_found, "no component " + name + " in this process; there are: " + known};
 }
 
-// --- Run, stop
-// ---------------------------------------------------------------------------------------------------------
+// --- Run, stop ---
 
 int Process::run(std::stop_token stop) {
   Parts& parts = *parts_;

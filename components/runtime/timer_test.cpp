@@ -3,11 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <mutex>
+#include <thread>
 #include <vector>
 
 #include "components/runtime/component.hpp"
 #include "components/runtime/testing/harness.hpp"
+#include "std_msgs/msg/string.hpp"
 
 namespace adit {
 namespace {
@@ -115,6 +118,27 @@ TEST(Timer, ASlowHandlerMakesItMissTicksNotQueueThem) {
   harness.start();
   ASSERT_TRUE(eventually([&] { return ticking.ticks() >= 3; }));
   EXPECT_GE(ticking.timer.stats().missed, 4u);
+}
+
+// A timer whose handler takes several of its periods is always due; what else the component has to do gets its turn.
+struct Overrun final : Component {
+  void publish_to_itself() { static_cast<void>(out.publish(std_msgs::msg::String{})); }
+  Output<std_msgs::msg::String> out{*this, "words", Qos::reliable()};
+  Input<std_msgs::msg::String> in{*this, "words", Qos::reliable(), Queue{2, WhenFull::drop_oldest},
+                                  [this](const std_msgs::msg::String&, const MessageInfo&) { ++messages; }};
+  Timer slow{*this, "slow", 1ms, [this](const TimerTick&) {
+               std::this_thread::sleep_for(5ms);
+               publish_to_itself();
+             }};
+  Timer other{*this, "other", 20ms, [this](const TimerTick&) { ++others; }};
+  std::atomic<int> messages{0}, others{0};
+};
+
+TEST(Timer, OneThatOverrunsStarvesNeitherMessagesNorOtherTimers) {
+  Harness harness(1);
+  auto& overrun = harness.make<Overrun>("overrun");
+  harness.start();
+  EXPECT_TRUE(eventually([&] { return overrun.messages >= 3 && overrun.others >= 3; }));
 }
 
 TEST(Timer, StopsWithItsComponent) {
