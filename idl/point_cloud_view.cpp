@@ -91,24 +91,26 @@ Result<PointCloudView> PointCloudView::of(const PointCloud2& cloud, PointTimeUni
   view.width_ = cloud.width;
   view.height_ = cloud.height;
   view.point_step_ = cloud.point_step;
-  view.row_step_ = cloud.row_step;
   view.swap_ = cloud.is_bigendian != (std::endian::native == std::endian::big);
 
-  // Products of two 32-bit numbers: no overflow in 64 bits.
+  // Products of two 32-bit numbers: no overflow in 64 bits. Nothing is stored in a size_t, 32 bits on small boards,
+  // before the data have been found to hold it.
   const std::uint64_t row_bytes = std::uint64_t{cloud.width} * cloud.point_step;
   const std::uint64_t points = std::uint64_t{cloud.width} * cloud.height;
-  if (cloud.height <= 1) view.row_step_ = std::max<std::size_t>(view.row_step_, row_bytes);  // drivers leave it zero
+  std::uint64_t row_step = cloud.row_step;
+  if (cloud.height <= 1) row_step = std::max(row_step, row_bytes);  // drivers leave it zero
   if (points > 0) {
-    if (view.row_step_ < row_bytes) {
+    if (row_step < row_bytes) {
       return malformed("row_step " + std::to_string(cloud.row_step) + " is less than width " +
                        std::to_string(cloud.width) + " times point_step " + std::to_string(cloud.point_step));
     }
     // The padding behind the last row may be missing.
-    const std::uint64_t needed = std::uint64_t{cloud.height - 1} * view.row_step_ + row_bytes;
+    const std::uint64_t needed = std::uint64_t{cloud.height - 1} * row_step + row_bytes;
     if (cloud.data.size() < needed) {
       return malformed("data holds " + std::to_string(cloud.data.size()) + " bytes, " + std::to_string(cloud.height) +
-                       " rows of " + std::to_string(view.row_step_) + " bytes need " + std::to_string(needed));
+                       " rows of " + std::to_string(row_step) + " bytes need " + std::to_string(needed));
     }
+    view.row_step_ = static_cast<std::size_t>(row_step);
   }
   if (points == 0) view.width_ = view.height_ = 0;  // 2^32 rows of nothing are nothing
   if (points > std::numeric_limits<std::uint32_t>::max()) return malformed("more than 2^32 points");
