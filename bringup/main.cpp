@@ -1,5 +1,6 @@
 // The `adit` program: one command a file in commands/.
 #include "bringup/commands/command.hpp"
+#include "bringup/commands/file_commands.hpp"
 
 int main(int argc, char** argv) {
   CLI::App app("Adit: DDS components and tunnel localization", "adit");
@@ -15,14 +16,8 @@ int main(int argc, char** argv) {
   adit::add_record_command(app, code);
   adit::add_play_command(app, code);
 #endif
-#ifdef ADIT_HAS_STACK
-  adit::add_evaluate_command(app, code);
-  adit::add_odometry_command(app, code);
-#endif
-#ifdef ADIT_HAS_SIMULATOR
-  adit::add_simulate_command(app, code);
-  adit::add_run_offline_command(app, code);
-  adit::add_suite_command(app, code);
+#ifdef ADIT_HAS_FILE_COMMANDS
+  if (const auto added = adit::add_file_commands(app, code, argc, argv); !added) return adit::fail(added.error());
 #endif
   CLI11_PARSE(app, argc, argv);
   return code;

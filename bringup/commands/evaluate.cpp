@@ -3,8 +3,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "bringup/commands/command.hpp"
 #include "bringup/commands/evaluation_report.hpp"
+#include "bringup/commands/file_commands.hpp"
 #ifdef ADIT_HAS_SIMULATOR
 #include "bringup/offline/scenario_description.hpp"
 #endif
@@ -103,8 +103,7 @@ Result<void> run(Arguments& arguments) {
 
 void add_evaluate_command(CLI::App& app, ExitCode& code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("evaluate", "compare trajectories with the truth: table, summary.json, report.html");
+  CLI::App* command = app.add_subcommand(file_commands::evaluate.name, file_commands::evaluate.description);
   command->add_option("--truth", arguments->truth, "TUM file")->check(CLI::ExistingFile);
   command->add_option("--estimate", arguments->estimates,
                       "NAME=FILE.tum (repeatable); with a FILE.cov beside it also NEES");

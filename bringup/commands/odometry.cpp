@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cstdio>
 
-#include "bringup/commands/command.hpp"
+#include "bringup/commands/file_commands.hpp"
 #include "bringup/commands/odometry_output.hpp"
 #include "bringup/deployment/deployment.hpp"
 #include "components/dataset/dataset.hpp"
@@ -127,7 +127,7 @@ Result<void> run_lidar(const Arguments& arguments) {
 
 void add_odometry_command(CLI::App& app, ExitCode& code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("odometry", "one front end offline on files, bit-identical from run to run");
+  CLI::App* command = app.add_subcommand(file_commands::odometry.name, file_commands::odometry.description);
   command->require_subcommand(1);
   CLI::App* lidar = command->add_subcommand("lidar", "LiDAR odometry on a folder of clouds");
   lidar->add_option("--input", arguments->input, "folder (components/dataset/README.md)")->required();

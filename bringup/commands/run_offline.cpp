@@ -1,9 +1,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "bringup/commands/command.hpp"
 #include "bringup/commands/deployment_options.hpp"
 #include "bringup/commands/evaluation_report.hpp"
+#include "bringup/commands/file_commands.hpp"
 #include "bringup/offline/run.hpp"
 
 namespace adit {
@@ -40,8 +40,7 @@ Result<void> run(Arguments& arguments) {
 void add_run_offline_command(CLI::App& app, ExitCode& code) {
   auto arguments = std::make_shared<Arguments>();
   offline::RunRequest& request = arguments->request;
-  CLI::App* command = app.add_subcommand(
-      "run-offline", "a deployment's components in one process, without DDS: as fast as it goes, bit-identical");
+  CLI::App* command = app.add_subcommand(file_commands::run_offline.name, file_commands::run_offline.description);
   arguments->deployment.add_to(*command);
   command->add_option("--input", request.input, "scenario file, bag or folder of clouds: instead of the file's sources")
       ->required()

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <cstdio>
 
-#include "bringup/commands/command.hpp"
+#include "bringup/commands/file_commands.hpp"
 #include "components/tunnel_simulator/bag_sink.hpp"
 #include "components/tunnel_simulator/folder_writer.hpp"
 #include "components/tunnel_simulator/scenario_loader.hpp"
@@ -101,7 +101,7 @@ Result<void> run(const Arguments& arguments) {
 
 void add_simulate_command(CLI::App& app, ExitCode& code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("simulate", "a tunnel scenario into a folder of files or a ROS 2 bag");
+  CLI::App* command = app.add_subcommand(file_commands::simulate.name, file_commands::simulate.description);
   command->add_option("scenario", arguments->scenario, "scenario file (bringup/scenarios)")->required();
   command->add_option("--out", arguments->out, "folder to write; an earlier run's files are replaced")->required();
   command->add_option("--format", arguments->format, "folder (components/tunnel_simulator/README.md) or bag (rosbag2)")

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "bringup/commands/command.hpp"
 #include "bringup/commands/deployment_options.hpp"
+#include "bringup/commands/file_commands.hpp"
 #include "bringup/evaluation/study.hpp"
 #include "bringup/offline/run.hpp"
 
@@ -118,8 +118,7 @@ Result<void> run(const Arguments& arguments) {
 
 void add_suite_command(CLI::App& app, ExitCode& code) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("suite", "a deployment offline on many scenarios with many seeds: medians and worst");
+  CLI::App* command = app.add_subcommand(file_commands::suite.name, file_commands::suite.description);
   command->add_option("deployment", arguments->deployment, "deployment file")
       ->check(CLI::ExistingFile)
       ->capture_default_str();
