@@ -38,9 +38,7 @@ Verdict FrameGate::check(const Frame& frame, float noise) {
   const bool shape_ok = frame.data != nullptr && frame.width == width_ && frame.height == height_ &&
                         (frame.stride == 0 || frame.stride >= frame.width);
   if (!shape_ok) return Verdict::wrong_size;
-  if (has_stamp_ && frame.stamp_ns <= last_stamp_ns_) return Verdict::bad_stamp;
-  has_stamp_ = true;
-  last_stamp_ns_ = frame.stamp_ns;
+  if (!newer(frame.stamp_ns)) return Verdict::bad_stamp;
 
   current_.clear();
   std::uint32_t low = 65535;
@@ -76,8 +74,22 @@ Verdict FrameGate::check(const Frame& frame, float noise) {
   return Verdict::good;
 }
 
-float estimate_noise(const Frame& frame) {
-  std::vector<float> differences;
+bool FrameGate::newer(std::int64_t stamp_ns) {
+  clock_set_back_ = false;
+  if (has_stamp_ && stamp_ns <= last_stamp_ns_) {
+    refused_run_ = refused_run_ > 0 && stamp_ns > refused_stamp_ns_ ? refused_run_ + 1 : 1;
+    refused_stamp_ns_ = stamp_ns;
+    if (refused_run_ < config_.clock_run) return false;
+    clock_set_back_ = true;
+  }
+  refused_run_ = 0;
+  has_stamp_ = true;
+  last_stamp_ns_ = stamp_ns;
+  return true;
+}
+
+float estimate_noise(const Frame& frame, std::vector<float>& differences) {
+  differences.clear();
   for (int y = 0; y + 1 < frame.height; y += 4) {
     const std::uint16_t* upper = row_of(frame, y);
     const std::uint16_t* lower = row_of(frame, y + 1);
@@ -97,6 +109,7 @@ FrontEnd::FrontEnd(const CameraModel& model, const Config& config) : config_(con
   columns_.assign(static_cast<std::size_t>(model.width), 0.0F);
   profile_.assign(static_cast<std::size_t>(model.width), 0.0F);
   scratch_.reserve(static_cast<std::size_t>(model.height));
+  samples_.reserve(static_cast<std::size_t>((model.width / 4 + 1) * (model.height / 4 + 1)));
   for (int dy = -radius; dy <= radius; ++dy) {
     for (int dx = -radius; dx <= radius; ++dx) {
       const float r2 = static_cast<float>(dx * dx + dy * dy);
@@ -107,13 +120,17 @@ FrontEnd::FrontEnd(const CameraModel& model, const Config& config) : config_(con
 }
 
 void FrontEnd::calibrate(const Frame& frame) {
-  std::vector<float> values;
+  samples_.clear();
   for (int y = 0; y < frame.height; y += 8) {
-    for (int x = 0; x < frame.width; x += 8) values.push_back(row_of(frame, y)[x]);
+    for (int x = 0; x < frame.width; x += 8) samples_.push_back(row_of(frame, y)[x]);
   }
-  zero_ = median(values);
-  noise_ = config_.noise_counts > 0.0F ? config_.noise_counts : estimate_noise(frame);
-  std::fill(columns_.begin(), columns_.end(), 0.0F);
+  zero_ = median(samples_);
+  const float before = noise_;
+  noise_ = config_.noise_counts > 0.0F ? config_.noise_counts : estimate_noise(frame, samples_);
+  // Stripes learned from pictures of another kind are no stripes of these.
+  const float ratio = before / noise_;
+  const bool same_kind = calibrated_ && ratio > 0.5F && ratio < 2.0F;
+  for (float& column : columns_) column = same_kind ? column * ratio : 0.0F;
   calibrated_ = true;
 }
 

@@ -29,24 +29,33 @@ class FrameGate {
  public:
   struct Config {
     float frozen_fraction = 0.1F;  // of the temporal noise
+    int clock_run = 5;             // frames refused for their stamps, each newer than the one before
   };
   FrameGate(const CameraModel& model, const Config& config);
   // `noise` in counts. A frame that is not good changes nothing but the remembered stamp and picture.
   Verdict check(const Frame& frame, float noise);
+  // The last frame was taken although it is older than the one before: clock_run frames in a row agreed with each other
+  // that the clock has been set back (or that one frame came from the future).
+  bool clock_set_back() const { return clock_set_back_; }
 
  private:
+  bool newer(std::int64_t stamp_ns);
+
   int width_;
   int height_;
   Config config_;
   bool has_stamp_ = false;
   std::int64_t last_stamp_ns_ = 0;
+  std::int64_t refused_stamp_ns_ = 0;
+  int refused_run_ = 0;
+  bool clock_set_back_ = false;
   std::vector<std::uint16_t> last_;
   std::vector<std::uint16_t> current_;
 };
 
 // Spatial estimate of the temporal noise [counts]: median absolute mixed second difference, which texture hardly
 // touches (after Immerkaer 1996). At least the quantisation noise.
-float estimate_noise(const Frame& frame);
+float estimate_noise(const Frame& frame, std::vector<float>& scratch);
 
 class FrontEnd {
  public:
@@ -61,9 +70,9 @@ class FrontEnd {
   };
   FrontEnd(const CameraModel& model, const Config& config);
 
-  // Median and noise of this frame become the unit and the zero. Called once; again only after a restart.
+  // Median and noise of this frame become the unit and the zero. While there is no map: a first frame of garbage must
+  // not be the unit of all that follow.
   void calibrate(const Frame& frame);
-  bool calibrated() const { return calibrated_; }
   float noise() const { return noise_; }  // counts
   const Rectifier& rectifier() const { return rectifier_; }
   // `frame` has passed the gate; `out` is allocated for the calibrated size.
@@ -83,6 +92,7 @@ class FrontEnd {
   std::vector<float> columns_;
   std::vector<float> profile_;
   std::vector<float> scratch_;
+  std::vector<float> samples_;
   std::array<float, 25> space_weights_{};
 };
 

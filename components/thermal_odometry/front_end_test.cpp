@@ -57,12 +57,35 @@ TEST(FrameGate, NamesEveryBadFrame) {
   EXPECT_EQ(gate.check(picture.at(90), 2.5F), Verdict::good);
 }
 
+TEST(FrameGate, AClockSetBackIsBelievedAfterFiveFramesThatAgree) {
+  FrameGate gate(camera(), {});
+  Picture picture;
+  std::uint32_t seed = 1;
+  const auto check = [&](std::int64_t stamp) {
+    picture.noise(++seed);
+    return gate.check(picture.at(stamp), 2.5F);
+  };
+  EXPECT_EQ(check(1'000'000), Verdict::good);
+  for (int i = 1; i < 5; ++i) EXPECT_EQ(check(100 + i), Verdict::bad_stamp);
+  EXPECT_EQ(check(105), Verdict::good);
+  EXPECT_TRUE(gate.clock_set_back());
+  EXPECT_EQ(check(106), Verdict::good);
+  EXPECT_FALSE(gate.clock_set_back());
+  // Late frames among punctual ones, and frames in reverse, are no clock.
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(check(200 + 10 * i), Verdict::good);
+    EXPECT_EQ(check(110 + i), Verdict::bad_stamp);
+  }
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(check(300 - i), Verdict::bad_stamp);
+}
+
 TEST(FrontEnd, NoiseIsFoundUnderTexture) {
   TestScene scene;
-  EXPECT_NEAR(estimate_noise(scene.render(Pose::Identity(), 0)), 2.5F, 0.6F);
+  std::vector<float> scratch;
+  EXPECT_NEAR(estimate_noise(scene.render(Pose::Identity(), 0), scratch), 2.5F, 0.6F);
   Picture pure;
   pure.noise(4, 4.0);
-  EXPECT_NEAR(estimate_noise(pure.at(0)), 4.0F, 0.3F);
+  EXPECT_NEAR(estimate_noise(pure.at(0), scratch), 4.0F, 0.3F);
 }
 
 TEST(FrontEnd, OutputIsInNoiseUnitsAndKeepsSixteenBits) {

@@ -7,6 +7,8 @@ namespace adit::thermal_odometry {
 
 bool PriorMotion::add(const BodyMotion& motion) {
   if (!motion.pose.matrix().allFinite() || !motion.twist.allFinite()) return false;
+  constexpr std::int64_t clock_set_back_ns = 1'000'000'000;  // no estimator repeats or reorders as much as this
+  if (count_ > 0 && motion.stamp_ns < recent(0).stamp_ns - clock_set_back_ns) clear();
   if (count_ > 0 && motion.stamp_ns <= recent(0).stamp_ns) return false;
   ring_[next_] = motion;
   next_ = (next_ + 1) % ring_.size();

@@ -43,7 +43,9 @@ class ThermalOdometry::Engine {
 
   const Estimate& process(const Frame& frame, const Prior* prior, const DepthPoints* depth) {
     if (depth != nullptr) mapper_.add_cloud(*depth);
-    const Verdict verdict = gate_.check(frame, front_end_.calibrated() ? front_end_.noise() : 1.0F);
+    // Without a map the noise may be that of garbage: only exact repetitions count as frozen then.
+    const bool unit_known = tracking_ || initialiser_->active();
+    const Verdict verdict = gate_.check(frame, unit_known ? front_end_.noise() : 1.0F);
     begin_estimate(frame, verdict);
     if (verdict != Verdict::good) {
       out_.status = verdict == Verdict::frozen ? Status::frozen
@@ -51,7 +53,8 @@ class ThermalOdometry::Engine {
                                                : Status::invalid_frame;
       return out_;
     }
-    if (!front_end_.calibrated()) front_end_.calibrate(frame);
+    if (gate_.clock_set_back()) restart();
+    if (!unit_known) front_end_.calibrate(frame);
     out_.noise_counts = front_end_.noise();
     front_end_.process(frame, current_);
     if (tracking_) {
