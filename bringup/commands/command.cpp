@@ -15,6 +15,7 @@ void add_participant_options(CLI::App& app, ParticipantConfig& config) {
       ->envname("ADIT_NETWORK")
       ->capture_default_str();
   app.add_option("--peer", config.peers, "address of another host to look for (repeatable)");
+  app.add_flag("--multicast", config.multicast, "look for other hosts by multicast on that interface");
   app.add_option("--ros-distro", config.ros_distro, "form of the ROS graph: humble, iron, jazzy or none")
       ->capture_default_str();
 }

@@ -28,7 +28,7 @@ void add_node_command(CLI::App& app, ExitCode& code);
 void add_doctor_command(CLI::App& app, ExitCode& code);
 void add_explain_command(CLI::App& app, ExitCode& code);
 
-// --middleware, --domain, --network, --peer, --ros-distro into `config`; defaults from $ADIT_MIDDLEWARE, $ADIT_DOMAIN.
+// --middleware, --domain, --network, --peer, --multicast, --ros-distro into `config`; defaults from $ADIT_MIDDLEWARE, $ADIT_DOMAIN.
 void add_participant_options(CLI::App& app, ParticipantConfig& config);
 
 // Prints "adit: <message>" on stderr and returns 1.
