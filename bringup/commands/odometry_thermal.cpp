@@ -1,5 +1,3 @@
-#include <png.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -10,6 +8,7 @@
 #include "bringup/commands/odometry_output.hpp"
 #include "bringup/commands/thermal_folder.hpp"
 #include "bringup/deployment/deployment.hpp"
+#include "components/dataset/png8.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/image.hpp"
 
@@ -29,16 +28,6 @@ struct Arguments {
   int every = 10;
   double file_rate = 30.0;
 };
-
-bool write_picture(const std::string& path, const Image& image) {
-  png_image png{};
-  png.version = PNG_IMAGE_VERSION;
-  png.width = image.width;
-  png.height = image.height;
-  png.format = PNG_FORMAT_RGB;
-  return png_image_write_to_file(&png, path.c_str(), 0, image.data.data(), static_cast<png_int_32>(image.step),
-                                 nullptr) != 0;
-}
 
 // What the parameter file says goes before what stands in the folder.
 Result<Value::Map> parameters_of(const Arguments& arguments, const ThermalFolder& folder) {
@@ -97,8 +86,11 @@ Result<void> run_thermal(const Arguments& arguments) {
                      char name[32];
                      std::snprintf(name, sizeof name, "/%06d.png", picture - 1);
                      const std::string path = arguments.pictures + name;
-                     if (!write_picture(path, *static_cast<const Image*>(message.get())))
-                       failed = Error{ErrorCode::io, path + ": cannot write"};
+                     const auto& image = *static_cast<const Image*>(message.get());
+                     if (Result<void> written =
+                             dataset::write_png8(path, {image.width, image.height, 3, image.step, image.data.span()});
+                         !written)
+                       failed = written.error();
                    });
   }
   ThermalFolderSource source(*std::move(folder), std::move(prior));

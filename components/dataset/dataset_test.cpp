@@ -8,6 +8,7 @@
 
 #include "components/dataset/pcd_file.hpp"
 #include "components/dataset/png16.hpp"
+#include "components/dataset/png8.hpp"
 #include "components/dataset/point_file.hpp"
 
 namespace adit::dataset {
@@ -103,6 +104,15 @@ TEST_F(DatasetTest, BrokenPngIsRefusedWithAReason) {
   fs::resize_file(path("images/cut.png"), fs::file_size(path("images/cut.png")) / 2);
   EXPECT_FALSE(read_png16(path("images/cut.png")));
   EXPECT_FALSE(write_png16(path("images/none.png"), Image16{}));
+
+  // A picture for people; the reader of sensor data refuses it.
+  const std::vector<std::uint8_t> bytes(2 * 10, 200);
+  ASSERT_TRUE(write_png8(path("picture.png"), {3, 2, 3, 10, bytes}));  // rows of 9 bytes, padded to 10
+  EXPECT_FALSE(read_png16(path("picture.png")));
+  ASSERT_TRUE(write_png8(path("grey.png"), {10, 2, 1, 0, bytes}));
+  EXPECT_FALSE(write_png8(path("short.png"), {4, 2, 3, 0, bytes}));
+  EXPECT_FALSE(write_png8(path("none.png"), {}));
+  EXPECT_FALSE(write_png8(path("nowhere/picture.png"), {10, 2, 1, 0, bytes}));
 }
 
 TEST_F(DatasetTest, PcdFieldsComeInTheStandardOrder) {

@@ -1,8 +1,6 @@
-#include <png.h>
-
-#include <cstring>
 #include <filesystem>
 
+#include "components/dataset/png8.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
 #include "sensor_msgs/msg/image.hpp"
@@ -37,24 +35,14 @@ class PictureWriterComponent final : public Component {
 
   Result<void> write(const Image& image) const {
     const bool rgb = image.encoding == "rgb8";
-    const std::size_t row = static_cast<std::size_t>(image.width) * (rgb ? 3 : 1);
-    if ((!rgb && image.encoding != "mono8") || image.width == 0 || image.height == 0 || image.step < row ||
-        image.data.size() < static_cast<std::size_t>(image.step) * image.height) {
-      return Error{ErrorCode::malformed, "image: " + image.encoding + ", not rgb8 or mono8, or of a wrong size"};
+    if (!rgb && image.encoding != "mono8") {
+      return Error{ErrorCode::malformed, "image: " + image.encoding + ", not rgb8 or mono8"};
     }
     std::error_code ignored;
     const std::filesystem::path path(path_.value());
     if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), ignored);
-    png_image png{};
-    png.version = PNG_IMAGE_VERSION;
-    png.width = image.width;
-    png.height = image.height;
-    png.format = rgb ? PNG_FORMAT_RGB : PNG_FORMAT_GRAY;
-    const auto stride = static_cast<png_int_32>(image.step);
-    if (png_image_write_to_file(&png, path.c_str(), 0, image.data.data(), stride, nullptr) == 0) {
-      return Error{ErrorCode::io, path.string() + ": " + png.message};
-    }
-    return {};
+    return dataset::write_png8(path.string(),
+                               {image.width, image.height, rgb ? 3U : 1U, image.step, image.data.span()});
   }
 };
 

@@ -1,7 +1,5 @@
 // render_pictures SCENARIO.yaml --out FILE.png --what thermal|above|inside|map [--time S]: pictures for the
 // documentation and for looking at a scenario before it is run.
-#include <png.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "components/dataset/png8.hpp"
 #include "components/tunnel_simulator/scenario_loader.hpp"
 #include "components/tunnel_simulator/simulation.hpp"
 
@@ -51,12 +50,8 @@ struct Picture {
     return half;
   }
   bool write(const std::string& path) const {
-    png_image image{};
-    image.version = PNG_IMAGE_VERSION;
-    image.width = static_cast<png_uint_32>(width);
-    image.height = static_cast<png_uint_32>(height);
-    image.format = PNG_FORMAT_RGB;
-    return png_image_write_to_file(&image, path.c_str(), 0, rgb.data(), 0, nullptr) != 0;
+    return static_cast<bool>(adit::dataset::write_png8(
+        path, {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), 3, 0, rgb}));
   }
 };
 
