@@ -12,6 +12,7 @@
 #include "idl/thermal_frame_view.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/camera_info.hpp"
+#include "sensor_msgs/msg/point_cloud2.hpp"
 
 namespace adit::thermal_odometry {
 namespace {
@@ -29,14 +30,14 @@ Result<void> set_distortion(std::span<const double> d, CameraModel& camera) {
   return {};
 }
 
+}  // namespace
+
 Matrix6d about_parent_axes(const Pose& pose, const Matrix6d& covariance) {
   Matrix6d rotation = Matrix6d::Zero();
   rotation.topLeftCorner<3, 3>() = rotation.bottomRightCorner<3, 3>() = pose.linear();
   const Matrix6d rotated = rotation * covariance * rotation.transpose();
   return 0.5 * (rotated + rotated.transpose());
 }
-
-}  // namespace
 
 std::int64_t nanoseconds(const builtin_interfaces::msg::Time& stamp) {
   return to_time(stamp).time_since_epoch().count();
@@ -114,6 +115,17 @@ void view_pixels(const ThermalFrameView& view, Frame& frame, std::vector<std::ui
   view.copy_to(buffer);
   frame.data = buffer.data();
   frame.stride = frame.width;
+}
+
+Result<void> CloudPoints::read(const sensor_msgs::msg::PointCloud2& message) {
+  const Result<PointCloudView> view = PointCloudView::of(message);
+  if (!view) return view.error();
+  view->copy_to(columns_);
+  if (columns_.x.empty()) return Error{ErrorCode::malformed, "a cloud without points"};
+  points.resize(columns_.x.size());
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = {columns_.x[i], columns_.y[i], columns_.z[i]};
+  seconds.assign(columns_.time.begin(), columns_.time.end());
+  return {};
 }
 
 std::optional<BodyMotion> body_motion_of(const nav_msgs::msg::Odometry& message) {

@@ -10,6 +10,7 @@
 #include "components/thermal_odometry/estimate.hpp"
 #include "components/thermal_odometry/frame.hpp"
 #include "components/thermal_odometry/prior_motion.hpp"
+#include "idl/point_cloud_view.hpp"
 #include "idl/result.hpp"
 
 namespace adit {
@@ -25,7 +26,8 @@ struct Odometry;
 }
 namespace sensor_msgs::msg {
 struct CameraInfo;
-}
+struct PointCloud2;
+}  // namespace sensor_msgs::msg
 }  // namespace adit
 
 namespace adit::thermal_odometry {
@@ -43,6 +45,20 @@ bool same(const CameraModel& a, const CameraModel& b);
 
 // Points `frame` to the message's pixels, or to a copy in `buffer` where their order or alignment forbids it.
 void view_pixels(const ThermalFrameView& view, Frame& frame, std::vector<std::uint16_t>& buffer);
+
+// A cloud as DepthPoints views it; reuses its memory.
+struct CloudPoints {
+  std::vector<Eigen::Vector3f> points;  // sensor frame [m]
+  std::vector<float> seconds;           // after the message's stamp; empty: the message has no times
+  // Errors: a message that is no cloud, or one without points.
+  Result<void> read(const sensor_msgs::msg::PointCloud2& message);
+
+ private:
+  PointColumns columns_;
+};
+
+// From the axes of the right increment of `pose` to those of its parent frame, as messages have covariances.
+Matrix6d about_parent_axes(const Pose& pose, const Matrix6d& covariance);
 
 // Nothing if the pose is none.
 std::optional<BodyMotion> body_motion_of(const nav_msgs::msg::Odometry& message);

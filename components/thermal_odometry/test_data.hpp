@@ -1,8 +1,6 @@
 // Recorded sequences for tests and benchmarks: 16-bit PNG files with their stamps, found beside the source tree.
 #pragma once
 
-#include <png.h>
-
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +12,7 @@
 
 #include <Eigen/Geometry>
 
+#include "components/dataset/png16.hpp"
 #include "components/geometry/trajectory.hpp"
 #include "components/thermal_odometry/frame.hpp"
 
@@ -37,31 +36,9 @@ struct Recorded {
 
 // Grey PNG with 16 bits; empty on any failure.
 inline Recorded read_png16(const std::filesystem::path& path) {
-  Recorded image;
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr) return image;
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png_create_info_struct(png);
-  std::vector<png_bytep> rows;
-  if (setjmp(png_jmpbuf(png)) == 0) {
-    png_init_io(png, file);
-    png_read_info(png, info);
-    if (png_get_bit_depth(png, info) == 16 && png_get_color_type(png, info) == PNG_COLOR_TYPE_GRAY) {
-      png_set_swap(png);
-      image.width = static_cast<int>(png_get_image_width(png, info));
-      image.height = static_cast<int>(png_get_image_height(png, info));
-      image.pixels.resize(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
-      for (int y = 0; y < image.height; ++y) {
-        rows.push_back(reinterpret_cast<png_bytep>(image.pixels.data() + static_cast<std::ptrdiff_t>(y) * image.width));
-      }
-      png_read_image(png, rows.data());
-    }
-  } else {
-    image = {};
-  }
-  png_destroy_read_struct(&png, &info, nullptr);
-  std::fclose(file);
-  return image;
+  Result<dataset::Image16> image = dataset::read_png16(path.string());
+  if (!image) return {};
+  return {static_cast<int>(image->width), static_cast<int>(image->height), std::move(image->pixels)};
 }
 
 inline Recorded read_frame(const std::filesystem::path& folder, int index) {

@@ -20,6 +20,7 @@ class TestScene {
   double offset = 0.0;    // counts, everywhere
   double gain = 1.0;
   std::vector<float> fixed_pattern;  // counts a pixel; empty: none
+  double repeats_every = 0.0;        // m along the corridor, even: the same walls again; 0: never
 
   explicit TestScene(std::uint32_t seed = 1) : random_(seed) {
     std::normal_distribution<float> normal;
@@ -121,6 +122,8 @@ class TestScene {
     return best;
   }
 
+  static int wrap(int i, int period) { return period > 0 ? (i % period + period) % period : i; }
+
   static double hash(int wall, int octave, int i, int j) {
     auto h = static_cast<std::uint32_t>(i) * 374761393U + static_cast<std::uint32_t>(j) * 668265263U +
              static_cast<std::uint32_t>(wall * 97 + octave) * 2246822519U;
@@ -139,13 +142,16 @@ class TestScene {
       if (fade == 0.0) break;
       const double x = hit.along / wavelength;
       const double y = hit.across / wavelength;
-      const int i = static_cast<int>(std::floor(x));
+      const int period = static_cast<int>(std::lround(repeats_every / wavelength));
+      const int at = static_cast<int>(std::floor(x));
+      const int i = wrap(at, period);
+      const int next = wrap(at + 1, period);
       const int j = static_cast<int>(std::floor(y));
       const auto ease = [](double s) { return s * s * (3.0 - 2.0 * s); };
-      const double fx = ease(x - i);
+      const double fx = ease(x - at);
       const double fy = ease(y - j);
-      const double near = hash(hit.wall, octave, i, j) * (1 - fx) + hash(hit.wall, octave, i + 1, j) * fx;
-      const double far = hash(hit.wall, octave, i, j + 1) * (1 - fx) + hash(hit.wall, octave, i + 1, j + 1) * fx;
+      const double near = hash(hit.wall, octave, i, j) * (1 - fx) + hash(hit.wall, octave, next, j) * fx;
+      const double far = hash(hit.wall, octave, i, j + 1) * (1 - fx) + hash(hit.wall, octave, next, j + 1) * fx;
       sum += fade * amplitude * (near * (1 - fy) + far * fy);
     }
     return sum;

@@ -13,7 +13,6 @@
 #include "components/thermal_odometry/points_picture.hpp"
 #include "components/thermal_odometry/prior_motion.hpp"
 #include "components/thermal_odometry/thermal_odometry.hpp"
-#include "idl/point_cloud_view.hpp"
 #include "idl/thermal_frame_view.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/camera_info.hpp"
@@ -104,9 +103,7 @@ class ThermalOdometryComponent final : public Component {
   std::int64_t last_published_ns_ = 0;
 
   std::vector<std::uint16_t> pixels_;
-  std::vector<Eigen::Vector3f> cloud_;
-  std::vector<float> cloud_seconds_;
-  PointColumns columns_;
+  thermal_odometry::CloudPoints cloud_;
   std::int64_t cloud_stamp_ns_ = 0;
   bool cloud_waiting_ = false;
   std::vector<thermal_odometry::MapPoint> map_points_;
@@ -216,14 +213,11 @@ void ThermalOdometryComponent::on_cloud(const PointCloud2& message) {
   };
   if (mode_ == Mode::mono) return;
   if (!camera_from_lidar_) return unused("the pose of the LiDAR is not given");
-  const Result<PointCloudView> view = PointCloudView::of(message);
-  if (!view) return unused(view.error().message);
-  view->copy_to(columns_);
-  if (columns_.x.empty()) return unused("a cloud without points");
-  if (cloud_waiting_) ++counts_.clouds_unused;  // two clouds between frames: the newer one
-  cloud_.resize(columns_.x.size());
-  for (std::size_t i = 0; i < cloud_.size(); ++i) cloud_[i] = {columns_.x[i], columns_.y[i], columns_.z[i]};
-  cloud_seconds_.assign(columns_.time.begin(), columns_.time.end());
+  // Two clouds between frames: the newer one, if it is one.
+  const bool replaces = cloud_waiting_;
+  cloud_waiting_ = false;
+  if (replaces) ++counts_.clouds_unused;
+  if (const Result<void> read = cloud_.read(message); !read) return unused(read.error().message);
   cloud_stamp_ns_ = thermal_odometry::nanoseconds(message.header.stamp) + std::llround(1e9 * lidar_time_offset_);
   cloud_waiting_ = true;
 }
@@ -285,7 +279,7 @@ void ThermalOdometryComponent::process(const ThermalFrameView& view, thermal_odo
   std::optional<thermal_odometry::Prior> prior;
   if (prior_motion_ && last_measured_ns_ != 0) prior = prior_motion_->between(last_measured_ns_, frame.stamp_ns);
   thermal_odometry::DepthPoints depth;
-  if (cloud_waiting_) depth = {cloud_, cloud_seconds_, cloud_stamp_ns_, *camera_from_lidar_};
+  if (cloud_waiting_) depth = {cloud_.points, cloud_.seconds, cloud_stamp_ns_, *camera_from_lidar_};
   const Time begin = clock().now();
   const Estimate& estimate = engine_->process(frame, prior ? &*prior : nullptr, cloud_waiting_ ? &depth : nullptr);
   cloud_waiting_ = false;
