@@ -46,7 +46,7 @@ struct Outcome {
   Pose odometry_end = Pose::Identity();
 };
 
-// 18 m ahead and 16 m back in reverse, a keyframe every 2 m; the odometry is 1 % too long.
+// 18 m ahead and 16 m back in reverse, a keyframe every 2 m; the odometry creeps ahead by 3 cm each.
 Outcome run(Value::Map parameters) {
   Outcome out;
   Recording recording;
@@ -63,7 +63,7 @@ Outcome run(Value::Map parameters) {
     Pose truth = TestScene::drive(0.3 * i, 0.0);
     truth.translation().z() = 2.05 * (i < 10 ? i : 18 - i);
     Pose motion = last.inverse() * truth;
-    motion.translation() *= 1.01;
+    motion.translation().z() += 0.03;
     out.odometry_end = out.odometry_end * motion;
     out.true_end = last = truth;
     const auto scan = scene.scan(truth, 0);
