@@ -1,6 +1,9 @@
 // thermal_odometry_folder_study FOLDER [--mono] [--yaw DEG] [--time-offset S] [--no-lidar FROM:TO] [--no-bilateral]
-//   [--no-window] [--global-shutter] [--prior SIGMA_V]: a simulated folder (components/tunnel_simulator/README.md)
+//   [--no-window] [--global-shutter] [--prior SIGMA_V] [--ffc EVERY:LENGTH]: a simulated folder
+//   (components/tunnel_simulator/README.md)
 // through the library, one line of figures against its truth.
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <optional>
@@ -18,6 +21,7 @@ struct Options {
   double yaw_deg = 0.0, time_offset = 0.0;
   double outage_from = 1e18, outage_to = 1e18;  // s since the first frame
   double prior_sigma = 0.0;                     // m/s, of a prior made from the truth; 0: none
+  double ffc_every = 0.0, ffc_length = 0.0;     // s, of a shutter closed without a word; 0: never
 };
 
 struct Scan {
@@ -79,6 +83,61 @@ double cpu_ms() {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
+// Silent flat-field corrections: the last picture again and again, then another offset (+-1.5 K of 50 counts) and
+// another fixed pattern (30 mK).
+class Shutter {
+ public:
+  Shutter(double every, double length) : every_(every), length_(length), pattern_(1U << 16U) {
+    std::mt19937 random(7);
+    std::normal_distribution<float> normal(0.0F, 1.5F);
+    for (float& value : pattern_) value = normal(random);
+  }
+  // Changes the picture of time `t` [s].
+  void apply(double t, Recorded& image) {
+    if (every_ <= 0.0) return;
+    const int event = static_cast<int>(t / every_);
+    closed_ = event > 0 && t - every_ * event < length_;
+    if (closed_ && event != event_) {
+      event_ = event;
+      ++events;
+      since_ = 0;
+    }
+    if (closed_) {
+      image = last_;
+      return;
+    }
+    if (event_ > 0) {
+      const float offset = event_ % 2 == 0 ? 75.0F : -75.0F;
+      for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+        const float value = static_cast<float>(image.pixels[i]) + offset +
+                            pattern_[(i * 7919U + static_cast<std::size_t>(event_) * 104729U) & 0xFFFFU];
+        image.pixels[i] = static_cast<std::uint16_t>(std::clamp(value + 0.5F, 0.0F, 65535.0F));
+      }
+    }
+    last_ = image;
+  }
+  void note(bool measured) {
+    if (event_ == 0) return;
+    frozen += closed_ ? 1 : 0;
+    frozen_measured += closed_ && measured ? 1 : 0;
+    if (closed_ || since_ < 0) return;
+    ++since_;
+    if (!measured) return;
+    longest = std::max(longest, since_);
+    ++recovered;
+    since_ = -1;
+  }
+  int events = 0, frozen = 0, frozen_measured = 0, recovered = 0, longest = 0;
+
+ private:
+  double every_, length_;
+  bool closed_ = false;
+  int event_ = 0;
+  int since_ = -1;  // live frames since the last event; -1: measured again
+  Recorded last_;
+  std::vector<float> pattern_;
+};
+
 struct Mean {
   double sum = 0.0;
   int n = 0;
@@ -110,13 +169,15 @@ int study(const Options& options) {
   std::vector<Eigen::Vector3f> points;
   std::vector<float> offsets, values;
   Mean frame_ms, keyframe_ms;
+  Shutter shutter(options.ffc_every, options.ffc_length);
   std::size_t next_scan = 0;
   std::int64_t last_ns = 0;
   int first = -1;
   double path_length = 0.0, error = 0.0, outage_path = -1.0, outage_error = 0.0, outage = -1.0;
   for (std::size_t i = 0; i < folder->stamps.size(); ++i) {
     const double t = 1e-9 * static_cast<double>(folder->stamps[i] - folder->stamps[0]);
-    const Recorded image = read_frame(path, static_cast<int>(i));
+    Recorded image = read_frame(path, static_cast<int>(i));
+    shutter.apply(t, image);
     const Frame frame = image.at(folder->stamps[i] - std::llround(1e9 * folder->time_constant));
     bool has_cloud = false;
     DepthPoints cloud;
@@ -150,6 +211,7 @@ int study(const Options& options) {
     const double begin = cpu_ms();
     const Estimate& estimate = (*odometry)->process(frame, prior ? &*prior : nullptr, has_cloud ? &cloud : nullptr);
     (estimate.new_keyframe ? keyframe_ms : frame_ms).add(cpu_ms() - begin);
+    shutter.note(estimate.measured);
     if (!estimate.measured || !truth) continue;
     last_ns = frame.stamp_ns;
     if (first < 0) first = static_cast<int>(i) + 1;
@@ -191,6 +253,11 @@ int study(const Options& options) {
       std::sqrt(squares / std::max(1, n)), similar.rmse, 100.0 * similar.rmse / path_length, similar.scale,
       100.0 * rigid.rmse / path_length, static_cast<double>(counters.keyframes) / (seconds.back() - seconds.front()),
       frame_ms.get(), keyframe_ms.get());
+  if (shutter.events > 0) {
+    std::printf(
+        "  FFC: %d events, %d frozen frames, %d of them measured; %d recovered, at the latest with live frame %d\n",
+        shutter.events, shutter.frozen, shutter.frozen_measured, shutter.recovered, shutter.longest);
+  }
   if (outage >= 0.0) std::printf("  without LiDAR: %.2f %% of its way\n", outage);
   return 0;
 }
@@ -217,6 +284,8 @@ int main(int count, char** arguments) {
       options.time_offset = std::atof(value().c_str());
     } else if (name == "--prior") {
       options.prior_sigma = std::atof(value().c_str());
+    } else if (name == "--ffc") {
+      std::sscanf(value().c_str(), "%lf:%lf", &options.ffc_every, &options.ffc_length);
     } else if (name == "--no-lidar") {
       std::sscanf(value().c_str(), "%lf:%lf", &options.outage_from, &options.outage_to);
     } else {
