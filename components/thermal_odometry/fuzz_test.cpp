@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-#include "components/thermal_odometry/fuzzed_drive.hpp"
+#include "components/thermal_odometry/fuzzed_component_drive.hpp"
 
 namespace adit::thermal_odometry {
 namespace {

@@ -1,4 +1,4 @@
-#include "components/thermal_odometry/fuzzed_drive.hpp"
+#include "components/thermal_odometry/fuzzed_component_drive.hpp"
 
 #include <algorithm>
 #include <cmath>
