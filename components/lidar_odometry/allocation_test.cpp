@@ -1,11 +1,11 @@
-// After warm-up a sweep costs no heap call. Counts every call of the C++ heap in this program.
+// After warm-up a sweep costs no heap call. Counts every allocation in this program.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "components/lidar_odometry/lidar_odometry.hpp"
 #include "components/lidar_odometry/test_scene.hpp"
-#include "components/runtime/testing/allocation_counter.hpp"
+#include "idl/testing/allocation_counter.hpp"
 
 namespace adit::lidar_odometry {
 namespace {
@@ -32,7 +32,7 @@ TEST(Allocation, ASweepCostsNoHeapCallAfterWarmUp) {
       std::uint64_t before = 0;
       // The first two rounds warm up; in the third every sweep is counted.
       for (int round = 0; round < 3; ++round) {
-        if (round == 2) before = adit::testing::allocations();
+        if (round == 2) before = adit::test::allocations();
         for (std::size_t k = 0; k < sweeps.size(); ++k) {
           Cloud cloud = sweeps[k].cloud();
           cloud.stamp_ns = stamp += 100'000'000;
@@ -40,7 +40,7 @@ TEST(Allocation, ASweepCostsNoHeapCallAfterWarmUp) {
           odometry.process(cloud, k % 4 == 0 ? &prior : nullptr);
         }
       }
-      EXPECT_EQ(adit::testing::allocations() - before, 0u) << to_string(mode) << ", " << threads << " threads";
+      EXPECT_EQ(adit::test::allocations() - before, 0u) << to_string(mode) << ", " << threads << " threads";
     }
   }
 }

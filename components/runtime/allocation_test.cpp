@@ -1,12 +1,12 @@
-// The data path does not touch the heap: counted by replacing operator new (this program's own).
+// The data path does not touch the heap: counted by replacing malloc (this program's own).
 #include <gtest/gtest.h>
 
 #include <atomic>
 
 #include "components/runtime/component.hpp"
-#include "components/runtime/testing/allocation_counter.hpp"
 #include "components/runtime/testing/fake_participant.hpp"
 #include "components/runtime/testing/harness.hpp"
+#include "idl/testing/allocation_counter.hpp"
 #include "sensor_msgs/msg/point_cloud2.hpp"
 
 namespace adit {
@@ -14,7 +14,7 @@ namespace {
 
 using sensor_msgs::msg::PointCloud2;
 using sensor_msgs::msg::PointField;
-using testing::allocations_of_this_thread;
+using test::allocations_of_this_thread;
 using testing::eventually;
 using testing::FakeDomain;
 using testing::Harness;

@@ -9,8 +9,8 @@
 
 #include "components/runtime/component.hpp"
 #include "components/runtime/process.hpp"
-#include "components/runtime/testing/allocation_counter.hpp"
 #include "components/runtime/testing/harness.hpp"
+#include "idl/testing/allocation_counter.hpp"
 #include "middleware/participant.hpp"
 #include "sensor_msgs/msg/point_cloud2.hpp"
 #include "std_msgs/msg/string.hpp"
@@ -21,7 +21,7 @@ namespace {
 using sensor_msgs::msg::PointCloud2;
 using sensor_msgs::msg::PointField;
 using std_msgs::msg::String;
-using testing::allocations_of_this_thread;
+using test::allocations_of_this_thread;
 using testing::eventually;
 using testing::Harness;
 

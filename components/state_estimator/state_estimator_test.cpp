@@ -7,9 +7,9 @@
 #include <functional>
 #include <limits>
 
-#include "components/runtime/testing/allocation_counter.hpp"
 #include "components/state_estimator/measurement_models.hpp"
 #include "components/state_estimator/test_support.hpp"
+#include "idl/testing/allocation_counter.hpp"
 
 namespace adit::state_estimator {
 namespace {
@@ -442,9 +442,9 @@ TEST(StateEstimator, SteadyStateDoesNotAllocate) {
     }
   };
   run(kSecond, 3 * kSecond);
-  const std::uint64_t before = adit::testing::allocations();
+  const std::uint64_t before = adit::test::allocations();
   run(3 * kSecond, 30 * kSecond);
-  EXPECT_EQ(adit::testing::allocations() - before, 0u);
+  EXPECT_EQ(adit::test::allocations() - before, 0u);
 }
 
 TEST(Config, ChecksNameWhatIsWrong) {

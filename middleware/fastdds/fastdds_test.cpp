@@ -6,7 +6,7 @@
 #include <cstring>
 #include <thread>
 
-#include "middleware/fastdds/allocation_counter.hpp"
+#include "idl/testing/allocation_counter.hpp"
 #include "middleware/vendor.hpp"
 
 namespace adit {
@@ -218,23 +218,23 @@ TEST_F(FastDds, TakingAllocatesNothingOnceWarm) {
   std::size_t published = 0, taken = 0;
   for (std::uint32_t n = 1; n <= 200; ++n) {
     const Numbered message(n, 5000);
-    const std::size_t before_publish = fastdds::allocations_of_thread();
+    const std::size_t before_publish = test::allocations_of_this_thread();
     const auto sent = writer->publish(message);
-    if (n > 100) published += fastdds::allocations_of_thread() - before_publish;
+    if (n > 100) published += test::allocations_of_this_thread() - before_publish;
     ASSERT_TRUE(sent);
     Sample out[2];
     std::size_t got = 0;
     while (got == 0) {
-      const std::size_t before_take = fastdds::allocations_of_thread();
+      const std::size_t before_take = test::allocations_of_this_thread();
       got = reader->take(out);
       out[0].reset();
-      if (n > 100) taken += fastdds::allocations_of_thread() - before_take;
+      if (n > 100) taken += test::allocations_of_this_thread() - before_take;
       std::this_thread::yield();
     }
   }
   EXPECT_EQ(taken, 0u);
   RecordProperty("allocations_in_100_publishes", static_cast<int>(published));
-  std::printf("allocations by operator new in 100 warm publishes: %zu\n", published);
+  std::printf("allocations in 100 warm publishes: %zu\n", published);
 }
 
 TEST_F(FastDds, GraphShowsOwnAndRemoteParticipantsAndEndpoints) {

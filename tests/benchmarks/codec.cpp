@@ -1,7 +1,7 @@
 // Encode and decode: time, bytes a second, allocations a message once the memory has grown.
 #include "idl/codec.hpp"
 
-#include "components/runtime/testing/allocation_counter.hpp"
+#include "idl/testing/allocation_counter.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "nav_msgs/msg/path.hpp"
 #include "sensor_msgs/msg/point_cloud2.hpp"
@@ -22,13 +22,13 @@ void report(benchmark::State& state, std::size_t bytes, std::uint64_t allocation
 template <Message T>
 void encode_message(benchmark::State& state, const T& message) {
   std::vector<std::byte> out(encoded_size(message));
-  const std::uint64_t before = testing::allocations_of_this_thread();
+  const std::uint64_t before = test::allocations_of_this_thread();
   for (auto _ : state) {
     if (encode(message, out) == 0) return fail(state, "does not encode");
     benchmark::DoNotOptimize(out.data());
     benchmark::ClobberMemory();
   }
-  report(state, out.size(), testing::allocations_of_this_thread() - before);
+  report(state, out.size(), test::allocations_of_this_thread() - before);
 }
 
 template <Message T>
@@ -42,13 +42,13 @@ void decode_message(benchmark::State& state, const T& message, bool view) {
     return decode(bytes, decoded, view ? KeepAlive(&nothing, &owner) : KeepAlive{}) == DecodeStatus::ok;
   };
   decode_once();
-  const std::uint64_t before = testing::allocations_of_this_thread();
+  const std::uint64_t before = test::allocations_of_this_thread();
   for (auto _ : state) {
     if (!decode_once()) return fail(state, "does not decode");
     benchmark::DoNotOptimize(&decoded);
     benchmark::ClobberMemory();
   }
-  report(state, bytes.size(), testing::allocations_of_this_thread() - before);
+  report(state, bytes.size(), test::allocations_of_this_thread() - before);
 }
 
 std_msgs::msg::Header header() {

@@ -7,7 +7,7 @@
 #include <ctime>
 #include <thread>
 
-#include "components/runtime/testing/allocation_counter.hpp"
+#include "idl/testing/allocation_counter.hpp"
 #include "tests/benchmarks/board.hpp"
 #include "tests/benchmarks/runtime_side.hpp"
 #include "tests/benchmarks/wait.hpp"
@@ -124,7 +124,7 @@ int run_receiver(const Peer& peer, Board& board) {
     if (number < board.latency_ns.size()) board.latency_ns[number] = static_cast<std::uint32_t>(now - sent);
     if (number == 0) first = now;
     last = now;
-    allocations = testing::allocations_of_this_thread();
+    allocations = test::allocations_of_this_thread();
     board.handled.store(number + 1, std::memory_order_release);
     sem_post(&board.credits);
   });

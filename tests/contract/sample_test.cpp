@@ -6,46 +6,53 @@
 #include <array>
 #include <atomic>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <thread>
 
+#include "idl/testing/allocation_counter.hpp"
 #include "tests/contract/contract.hpp"
 
 namespace {
 
-// Allocations of the calling thread while `counting` is set: by a vendor's library, and by everybody else (us).
-thread_local bool counting = false;
-thread_local std::size_t by_vendor = 0;
-thread_local std::size_t by_us = 0;
-thread_local std::array<const void*, 8> our_callers{};
+// Allocations of the calling thread while observed: by a vendor's library, and by everybody else (us).
+std::size_t by_vendor = 0, by_us = 0;
+std::array<const void*, 8> our_callers{};
 
 const char* object_of(const void* address) {
   Dl_info object{};
   return dladdr(address, &object) != 0 && object.dli_fname ? object.dli_fname : "?";
 }
 
-// The standard library allocates on behalf of whoever called it.
-const void* beyond_standard_library(const void* caller) {
-  if (!std::strstr(object_of(caller), "libstdc++")) return caller;
+bool allocates_for_others(const void* frame) {
+  const char* const object = object_of(frame);
+  constexpr std::array libraries = {"libstdc++", "libc.so", "libasan", "libtsan"};
+  return std::any_of(libraries.begin(), libraries.end(), [&](const char* name) { return std::strstr(object, name); });
+}
+
+// The standard libraries and the sanitizers' allocators allocate on behalf of whoever called them.
+const void* who_asked(const void* caller) {
+  if (!allocates_for_others(caller)) return caller;
   std::array<void*, 32> frames{};
   const auto end = frames.begin() + backtrace(frames.data(), static_cast<int>(frames.size()));
-  const auto asked = std::find_if(std::find(frames.begin(), end, caller), end,
-                                  [](const void* frame) { return !std::strstr(object_of(frame), "libstdc++"); });
+  const auto asked = std::find_if_not(std::find(frames.begin(), end, caller), end, allocates_for_others);
   return asked == end ? caller : *asked;
 }
 
 void count(const void* caller) {
-  counting = false;  // looking at the caller may allocate
-  caller = beyond_standard_library(caller);
+  caller = who_asked(caller);
   const char* const object = object_of(caller);
   if (std::strstr(object, "libfast") || std::strstr(object, "libddsc")) {
     ++by_vendor;
   } else {
     our_callers[by_us++ % our_callers.size()] = caller;
   }
-  counting = true;
 }
+
+class Observed {
+ public:
+  Observed() { adit::test::observe_allocations_of_this_thread(&count); }
+  ~Observed() { adit::test::observe_allocations_of_this_thread(nullptr); }
+};
 
 // Which functions those were that count as ours.
 std::string names_of_our_callers() {
@@ -58,36 +65,7 @@ std::string names_of_our_callers() {
   return names;
 }
 
-void* allocate(std::size_t size, std::size_t alignment, const void* caller) {
-  if (counting) count(caller);
-  const std::size_t rounded = (std::max<std::size_t>(size, 1) + alignment - 1) / alignment * alignment;
-  if (void* const memory = std::aligned_alloc(alignment, rounded)) return memory;
-  throw std::bad_alloc();
-}
-
 }  // namespace
-
-void* operator new(std::size_t size) {
-  return allocate(size, alignof(std::max_align_t), __builtin_return_address(0));
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return allocate(size, static_cast<std::size_t>(alignment), __builtin_return_address(0));
-}
-void* operator new(std::size_t size, std::align_val_t alignment, const std::nothrow_t&) noexcept {
-  return allocate(size, static_cast<std::size_t>(alignment), __builtin_return_address(0));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace adit::contract {
 namespace {
@@ -214,21 +192,21 @@ TEST_P(Samples, PublishAndTakeDoNotAllocateOnceWarm) {
     constexpr unsigned measured = 50;
     for (unsigned n = 1; n <= measured; ++n) {
       const Payload message(size, n);
-      counting = true;
-      const bool sent = static_cast<bool>(link.writer->publish(message));
-      counting = false;
+      bool sent = false;
+      {
+        const Observed observed;
+        sent = static_cast<bool>(link.writer->publish(message));
+      }
       ASSERT_TRUE(sent);
       Sample sample[1];
       std::size_t taken = 0;
       ASSERT_TRUE(wait_until([&] {
-        counting = true;
+        const Observed observed;
         taken = link.reader->take(sample);
-        counting = false;
         return taken == 1;
       }));
-      counting = true;
+      const Observed observed;
       sample[0].reset();
-      counting = false;
     }
     std::printf("%zu bytes: allocations per message in our calls: ours %.2f, the vendors' %.2f\n", size,
                 static_cast<double>(by_us) / measured, static_cast<double>(by_vendor) / measured);
