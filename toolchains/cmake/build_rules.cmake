@@ -39,8 +39,8 @@ function(adit_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)  # only ends a test that hangs: seconds here, many times that on a loaded or emulated machine
   endif()
-  if(CMAKE_CROSSCOMPILING)
-    math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 10")  # an emulated processor
+  if(CMAKE_CROSSCOMPILING OR ADIT_SANITIZE)
+    math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 10")  # an emulated processor, instrumented code
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE adit_build ${ARG_LINKS} GTest::gmock_main)
