@@ -17,7 +17,6 @@ struct Configuration {
   std::size_t fragment_bytes = 0;
   std::uint32_t last_participant_index = 0;
   bool multicast = false;
-  bool shared_memory = false;
   std::vector<std::string> peers;
   std::vector<std::string> warnings;  // one clear line each, with what to do
 };

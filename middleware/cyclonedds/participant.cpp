@@ -113,7 +113,7 @@ std::string CycloneParticipant::explain() const {
        << "  socket buffers receive " << c.receive_buffer << " bytes, send " << c.send_buffer << " bytes ("
        << state_->config.socket_buffer_bytes << " asked for)\n"
        << "  fragments      " << c.fragment_bytes << " bytes, one UDP datagram each\n"
-       << "  shared memory  " << (c.shared_memory ? "iceoryx" : "off") << "\n"
+       << "  shared memory  not used with Cyclone DDS\n"
        << "  security       "
        << (state_->config.security ? "DDS Security, enclave " + state_->config.security->enclave : std::string("off"))
        << "\n";
