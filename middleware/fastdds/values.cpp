@@ -124,6 +124,8 @@ dds::DataWriterQos writer_qos(const EndpointConfig& config, bool synchronous) {
   qos.publish_mode().kind = synchronous ? dds::SYNCHRONOUS_PUBLISH_MODE : dds::ASYNCHRONOUS_PUBLISH_MODE;
   qos.reliable_writer_qos().times.heartbeatPeriod = milliseconds(heartbeat_period_ms(config.qos));
   qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
+  // What a reader asks for again goes out at once: within the vendor's 5 ms a fast writer overwrites it.
+  qos.reliable_writer_qos().times.nackResponseDelay = milliseconds(0);
   return qos;
 }
 
