@@ -26,9 +26,10 @@ struct ParticipantConfig {
   std::vector<std::string> peers;    // static peers: addresses of other hosts to look for (no multicast needed)
   bool multicast = false;            // discovery by multicast on a real interface; loopback always uses unicast
   std::string ros_distro = "jazzy";  // "humble" (24-byte gids) | "iron" | "jazzy" | "none" (stay out of the ROS graph)
-  bool shared_memory = true;         // Fast DDS: SHM transport; Cyclone DDS: iceoryx, only when RouDi runs
-  std::size_t shared_memory_bytes = 16u << 20;  // Fast DDS segment; opening touches all of it, about 0.7 ms per MB
-  std::size_t socket_buffer_bytes = 4u << 20;   // asked for; what the kernel granted is in explain()
+  bool shared_memory = true;         // Fast DDS: SHM transport; Cyclone DDS has none (its README)
+  // Fast DDS segment. Opening touches all of it, about 0.7 ms per MB; in this one clouds of 4 MB lose nothing at 10 Hz.
+  std::size_t shared_memory_bytes = 8u << 20;
+  std::size_t socket_buffer_bytes = 4u << 20;  // asked for; what the kernel granted is in explain()
   std::optional<SecurityConfig> security;
 };
 

@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   auto udp = std::make_shared<transport::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {"127.0.0.1"};
   auto memory = std::make_shared<transport::SharedMemTransportDescriptor>();
-  memory->segment_size(16u << 20);
+  memory->segment_size(8u << 20);
   participant_qos.transport().use_builtin_transports = false;
   participant_qos.transport().user_transports = {memory, udp};
   auto& builtin = participant_qos.wire_protocol().builtin;
