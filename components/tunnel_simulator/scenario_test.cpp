@@ -90,8 +90,7 @@ TEST(Scenarios, SixteenAndTheirVariantsParse) {
   const auto files = all_scenarios();
   EXPECT_GE(files.size(), 16U);
   for (int number = 1; number <= 16; ++number) {
-    char prefix[8];
-    std::snprintf(prefix, sizeof prefix, "s%02d", number);
+    const std::string prefix = (number < 10 ? "s0" : "s") + std::to_string(number);
     EXPECT_TRUE(std::any_of(files.begin(), files.end(), [&](const auto& f) {
       return f.filename().string().rfind(prefix, 0) == 0;
     })) << prefix;
