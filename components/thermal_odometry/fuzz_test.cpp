@@ -15,8 +15,8 @@ int setting(const char* name, int fallback) {
 }
 
 TEST(ThermalOdometryFuzz, SurvivesAndTracksAgain) {
-  const auto figures = run_fuzzed_drive(setting("ADIT_FUZZ_FRAMES", ADIT_FUZZ_DEFAULT_FRAMES),
-                                        static_cast<std::uint32_t>(setting("ADIT_FUZZ_SEED", 1)));
+  const auto figures = run_fuzzed_component_drive(setting("ADIT_FUZZ_FRAMES", ADIT_FUZZ_DEFAULT_FRAMES),
+                                                  static_cast<std::uint32_t>(setting("ADIT_FUZZ_SEED", 1)));
   ASSERT_TRUE(figures) << figures.error().message;
   print(*figures);
   EXPECT_EQ(figures->not_finite, 0);

@@ -395,7 +395,7 @@ std::string_view to_string(Fault fault) {
   return names[static_cast<std::size_t>(fault)];
 }
 
-Result<FuzzFigures> run_fuzzed_drive(int frames, std::uint32_t seed) {
+Result<FuzzFigures> run_fuzzed_component_drive(int frames, std::uint32_t seed) {
   ComponentConfig config;
   config.type = config.name = "thermal_odometry";
   config.log_level = LogLevel::off;

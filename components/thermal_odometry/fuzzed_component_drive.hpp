@@ -66,7 +66,7 @@ struct FuzzFigures {
 };
 
 // Errors: the component ended the run, which is what it must not do.
-Result<FuzzFigures> run_fuzzed_drive(int frames, std::uint32_t seed);
+Result<FuzzFigures> run_fuzzed_component_drive(int frames, std::uint32_t seed);
 
 // One line a fault, for people.
 void print(const FuzzFigures& figures);
