@@ -58,7 +58,7 @@ class Recorder {
       dataset::BagTopic topic;
       topic.name = port.topic;
       topic.type = port.type->ros_name;
-      topic.qos = dataset::bag_qos(Qos::reliable(10));
+      topic.qos = dataset::bag_qos_text({dataset::BagQos{}});
       topic.type_hash = port.type->type_hash;
       topic.schema = port.type->schema;
       const Result<std::size_t> index = writer_->add_topic(topic);

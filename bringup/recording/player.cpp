@@ -116,19 +116,21 @@ Result<void> Player::add_channels() {
     channel->hash = topic.type_hash.empty() && known ? std::string(known->info->type_hash) : topic.type_hash;
     channel->type = {channel->ros_type, channel->dds_type, channel->hash, topic.schema,
                      known ? known->info->typical_size : std::size_t{1024}};
-    const Result<Qos> qos = dataset::bag_qos_offer(topic.qos);
-    if (!qos) return Error{qos.error().code, topic.name + ": " + qos.error().message};
+    const Result<dataset::BagQos> recorded = dataset::bag_qos_offer(topic.qos);
+    if (!recorded) return Error{recorded.error().code, topic.name + ": " + recorded.error().message};
     const auto renamed = config_.remap.find(topic.name);
     EndpointConfig endpoint;
     endpoint.topic = renamed == config_.remap.end() ? topic.name : renamed->second;
     endpoint.type = &channel->type;
-    endpoint.qos = *qos;
+    endpoint.qos = Qos::reliable(recorded->depth);
+    if (!recorded->reliable) endpoint.qos.reliability = Qos::Reliability::best_effort;
+    if (recorded->transient_local) endpoint.qos.durability = Qos::Durability::transient_local;
     endpoint.node = kNode;
     if (!names.emplace(endpoint.topic, topic.name).second) {
       return Error{ErrorCode::invalid_argument,
                    topic.name + " and " + names[endpoint.topic] + " would both be sent as " + endpoint.topic};
     }
-    channel->latched = qos->durability == Qos::Durability::transient_local;
+    channel->latched = recorded->transient_local;
     Result<std::unique_ptr<Writer>> writer = participant_->writer(endpoint);
     if (!writer) return Error{writer.error().code, endpoint.topic + ": " + writer.error().message};
     channel->writer = *std::move(writer);

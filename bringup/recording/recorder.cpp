@@ -18,18 +18,15 @@ std::uint64_t missed(const Reader& reader) {
   return stats.lost + stats.overwritten + stats.rejected;
 }
 
-// All profiles offered, each once: a player then knows what readers may have asked for.
+// All profiles offered: a player then knows what readers may have asked for.
 std::string offered_profiles(const std::vector<EndpointInfo>& writers) {
-  std::vector<std::string> profiles;
+  std::vector<dataset::BagQos> profiles;
   for (const EndpointInfo& writer : writers) {
-    Qos qos = writer.qos;
-    if (!writer.history_known) qos.depth = std::max(qos.depth, 10u);
-    std::string text = dataset::bag_qos(qos);
-    if (std::find(profiles.begin(), profiles.end(), text) == profiles.end()) profiles.push_back(std::move(text));
+    profiles.push_back({writer.qos.reliability == Qos::Reliability::reliable,
+                        writer.qos.durability == Qos::Durability::transient_local,
+                        writer.history_known ? writer.qos.depth : std::max(writer.qos.depth, 10U)});
   }
-  std::string all;
-  for (const std::string& profile : profiles) all += (all.empty() ? "" : "\n") + profile;
-  return all;
+  return dataset::bag_qos_text(profiles);
 }
 
 }  // namespace

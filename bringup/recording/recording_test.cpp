@@ -139,10 +139,10 @@ TEST_P(Recording, StoresEveryTopicByteForByte) {
   EXPECT_THAT(stored["/rig"], testing::ElementsAre(text("before the recording")));
   EXPECT_THAT(stored["/gas"], testing::ElementsAre(text("opaque")));
   for (const dataset::BagTopic& topic : (*bag)->info().topics) {
-    const Qos offer = *dataset::bag_qos_offer(topic.qos);
-    EXPECT_EQ(offer.durability == Qos::Durability::transient_local, topic.name == "/rig");
+    const dataset::BagQos offer = *dataset::bag_qos_offer(topic.qos);
+    EXPECT_EQ(offer.transient_local, topic.name == "/rig");
     if (topic.name == "/gas") {
-      EXPECT_EQ(offer.reliability, Qos::Reliability::best_effort);
+      EXPECT_FALSE(offer.reliable);
       EXPECT_EQ(topic.type, foreign_type.ros_name);
     }
     EXPECT_EQ(topic.type_hash,
@@ -179,8 +179,8 @@ void write_bag(const std::string& folder) {
   ASSERT_TRUE(bag) << bag.error().message;
   const TypeInfo& type = type_info<String>();
   const std::string name(type.ros_name);
-  const auto words = (*bag)->add_topic({"/words", name, dataset::bag_qos(Qos::reliable(100)), "", ""});
-  const auto rig = (*bag)->add_topic({"/rig", name, dataset::bag_qos(Qos::latched()), "", ""});
+  const auto words = (*bag)->add_topic({"/words", name, dataset::bag_qos_text({{true, false, 100}}), "", ""});
+  const auto rig = (*bag)->add_topic({"/rig", name, dataset::bag_qos_text({{true, true, 1}}), "", ""});
   ASSERT_TRUE((*bag)->write({*rig, 5'000'000'000, text("rig")}));
   for (int i = 0; i < 10; ++i) {
     ASSERT_TRUE((*bag)->write({*words, 5'000'000'000 + i * 50'000'000, text("word " + std::to_string(i))}));

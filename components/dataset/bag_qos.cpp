@@ -16,12 +16,8 @@ constexpr const char* kTransientLocal = "1";
 constexpr const char* kVolatile = "2";
 constexpr std::uint32_t kGreatestDepth = 100'000;  // above it the number is damaged, or means "all"
 
-// A duration of rmw; without limit: the greatest int64 of nanoseconds.
-std::string duration(const char* key, const std::optional<Duration>& value) {
-  const std::int64_t nanoseconds = value.value_or(Duration::max()).count();
-  return std::string("  ") + key + ":\n    sec: " + std::to_string(nanoseconds / 1'000'000'000) +
-         "\n    nsec: " + std::to_string(nanoseconds % 1'000'000'000) + "\n";
-}
+// rmw's duration without limit: the greatest int64 of nanoseconds.
+constexpr const char* kNoLimit = ":\n    sec: 9223372036\n    nsec: 854775807\n";
 
 bool is(const std::string& text, const char* number, const char* word) {
   return text == number || text == word;
@@ -29,33 +25,37 @@ bool is(const std::string& text, const char* number, const char* word) {
 
 }  // namespace
 
-std::string bag_qos(const Qos& offered) {
-  const bool manual = offered.liveliness == Qos::Liveliness::manual_by_topic;
-  return std::string("- history: ") + (offered.depth == 0 ? kKeepAll : kKeepLast) +
-         "\n  depth: " + std::to_string(offered.depth) +
-         "\n  reliability: " + (offered.reliability == Qos::Reliability::reliable ? kReliable : kBestEffort) +
-         "\n  durability: " + (offered.durability == Qos::Durability::transient_local ? kTransientLocal : kVolatile) +
-         "\n" + duration("deadline", offered.deadline) + duration("lifespan", offered.lifespan) +
-         "  liveliness: " + (manual ? "3" : "1") + "\n" + duration("liveliness_lease_duration", offered.lease) +
-         "  avoid_ros_namespace_conventions: false";
+std::string bag_qos_text(const std::vector<BagQos>& offered) {
+  std::string text;
+  for (std::size_t i = 0; i < offered.size(); ++i) {
+    const BagQos& qos = offered[i];
+    if (std::find(offered.begin(), offered.begin() + static_cast<std::ptrdiff_t>(i), qos) !=
+        offered.begin() + static_cast<std::ptrdiff_t>(i)) {
+      continue;
+    }
+    text += (text.empty() ? "" : "\n") + std::string("- history: ") + (qos.depth == 0 ? kKeepAll : kKeepLast) +
+            "\n  depth: " + std::to_string(qos.depth) + "\n  reliability: " + (qos.reliable ? kReliable : kBestEffort) +
+            "\n  durability: " + (qos.transient_local ? kTransientLocal : kVolatile) + "\n  deadline" + kNoLimit +
+            "  lifespan" + kNoLimit + "  liveliness: 1\n  liveliness_lease_duration" + kNoLimit +
+            "  avoid_ros_namespace_conventions: false";
+  }
+  return text;
 }
 
-Result<Qos> bag_qos_offer(const std::string& text) {
-  if (text.find_first_not_of(" \n[]") == std::string::npos) return Qos::reliable(10);
+Result<BagQos> bag_qos_offer(const std::string& text) {
+  if (text.find_first_not_of(" \n[]") == std::string::npos) return BagQos{};
   // The stored text is a list; the reader wants a mapping around it.
   const auto document = YamlDocument::parse("profiles:\n" + text, "offered_qos_profiles");
   if (!document) return document.error();
-  Qos offer;
-  offer.reliability = Qos::Reliability::best_effort;
-  offer.depth = 1;
+  BagQos offer{.reliable = false, .transient_local = false, .depth = 1};
   const std::vector<YamlSection> profiles = document->root().sections("profiles");
   bool keep_all = false;
   for (const YamlSection& profile : profiles) {
     // Rosbag2 writes an unknown policy as it got it from the middleware; the default of rmw is then the safe reading.
     const std::string reliability = profile.text("reliability", kReliable);
     const std::string durability = profile.text("durability", kVolatile);
-    if (!is(reliability, kBestEffort, "best_effort")) offer.reliability = Qos::Reliability::reliable;
-    if (is(durability, kTransientLocal, "transient_local")) offer.durability = Qos::Durability::transient_local;
+    if (!is(reliability, kBestEffort, "best_effort")) offer.reliable = true;
+    if (is(durability, kTransientLocal, "transient_local")) offer.transient_local = true;
     keep_all |= is(profile.text("history", kKeepLast), kKeepAll, "keep_all");
     const std::int64_t depth = profile.integer("depth", 10);
     if (depth > kGreatestDepth) keep_all = true;

@@ -48,7 +48,7 @@ template <class Message>
 void BagSink::write(const std::string& topic, const Message& message, std::int64_t stamp_ns, bool latched) {
   const TypeInfo& type = type_info<Message>();
   const auto index = writer_->add_topic({topic, std::string(type.ros_name),
-                                         dataset::bag_qos(latched ? Qos::latched() : Qos::reliable(10)),
+                                         dataset::bag_qos_text({{true, latched, latched ? 1U : 10U}}),
                                          std::string(type.type_hash), std::string(type.schema)});
   if (!index) {
     error_ = index.error();
