@@ -49,9 +49,9 @@ std::string_view to_string(Fault fault);
 
 struct FuzzFigures {
   int frames = 0;
-  int good = 0;            // frames without a fault, faults() excluded
+  int good = 0;            // frames between the episodes
   int good_measured = 0;   // of them
-  int measured_wrong = 0;  // of them: at least 10 frames after a fault, off by more than 0.5 m/s and 10 sigma
+  int measured_wrong = 0;  // of them, 10 frames or more after a fault: off by more than 0.5 m/s and 10 sigma
   int not_finite = 0;      // messages
   int false_motion = 0;    // frames without a scene that were measured
   struct OfFault {
