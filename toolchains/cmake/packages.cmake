@@ -34,7 +34,8 @@ foreach(folder IN LISTS framework_folders)
 endforeach()
 # Work on files, and load desktop libraries where those are built in (bringup/commands/file_commands.hpp).
 set(tools "")
-foreach(target adit_dataset_pcd adit_evaluation adit_offline adit_file_commands)
+foreach(target adit_dataset_pcd adit_evaluation adit_offline adit_file_commands adit_thermal_loops
+        adit_component_thermal_loop_closure)
   if(TARGET ${target})
     list(REMOVE_ITEM framework ${target})
     list(APPEND tools ${target})
