@@ -8,7 +8,7 @@
 namespace adit::thermal_odometry {
 namespace {
 
-constexpr double origin_information = 1e10;  // holds the first keyframe
+constexpr double origin_information = 1e10;  // holds the brightness of the first keyframe
 
 }  // namespace
 
@@ -37,6 +37,14 @@ int Window::free_slot() const {
   return -1;
 }
 
+int Window::oldest() const {
+  int slot = -1;
+  for (int s = 0; s < max_keyframes; ++s) {
+    if (keyframe(s).used && (slot < 0 || keyframe(s).id < keyframe(slot).id)) slot = s;
+  }
+  return slot;
+}
+
 int Window::count() const {
   return static_cast<int>(
       std::count_if(keyframes_.begin(), keyframes_.end(), [](const Keyframe& k) { return k.used; }));
@@ -50,6 +58,7 @@ int Window::add_keyframe(std::int64_t stamp_ns, const CameraState& state, Pyrami
   k.used = true;
   k.in_prior = origin;
   k.id = next_id_++;
+  k.hosted = 0;
   k.stamp_ns = stamp_ns;
   k.state = k.first = state;
   k.delta.setZero();
@@ -57,7 +66,7 @@ int Window::add_keyframe(std::int64_t stamp_ns, const CameraState& state, Pyrami
   newest_ = slot;
   for (WindowPoint& point : points_) point.sight[static_cast<std::size_t>(slot)] = Sight::untried;
   if (origin) {
-    for (int i = 0; i < state_size; ++i) prior_H_(slot * state_size + i, slot * state_size + i) = origin_information;
+    for (int i = 6; i < state_size; ++i) prior_H_(slot * state_size + i, slot * state_size + i) = origin_information;
   }
   return slot;
 }
@@ -71,6 +80,7 @@ bool Window::add_point(const Patch& patch, float prior_information) {
   if (!take_template(keyframe(patch.host).image.level(0), patch.u, patch.v, config_.gradient_scale, point.look))
     return false;
   points_.push_back(point);
+  ++keyframe(patch.host).hosted;
   return true;
 }
 
@@ -99,6 +109,7 @@ void Window::apply(const Vector& step) {
 Window::Stats Window::optimise(int iterations) {
   Stats stats;
   for (PointSystem& system : systems_) system.marked = false;
+  const int held = oldest();
   for (int iteration = 0; iteration < iterations; ++iteration) {
     linearise(false, 1e-4);
     sigma_ = std::clamp(static_cast<float>(std::sqrt(normal_.scale)), config_.min_sigma, config_.max_sigma);
@@ -116,7 +127,7 @@ Window::Stats Window::optimise(int iterations) {
       g[at + 6] += a_information * keyframe(s).state.a;
       H(at + 7, at + 7) += b_information;
       g[at + 7] += b_information * keyframe(s).state.b;
-      for (int k = 0; k < state_size; ++k) index[static_cast<std::size_t>(active++)] = at + k;
+      for (int k = s == held ? 6 : 0; k < state_size; ++k) index[static_cast<std::size_t>(active++)] = at + k;
     }
     // Solve on the used slots, scaled to a unit diagonal.
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, dimension, dimension> A(active, active);

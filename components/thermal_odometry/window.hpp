@@ -26,8 +26,7 @@ struct Keyframe {
   Eigen::Matrix<double, state_size, 1> delta = Eigen::Matrix<double, state_size, 1>::Zero();
   CameraState state;  // exp(delta) first
   Pyramid image;
-  int selected = 0;
-  int anchored = 0;
+  int hosted = 0;  // points it was given
 };
 
 enum class Sight : std::uint8_t { untried, in, outlier, outside };
@@ -70,13 +69,14 @@ class Window {
   // A free slot for the next keyframe, or -1: marginalise first.
   int free_slot() const;
   int newest() const { return newest_; }
+  int oldest() const;  // -1: none
   int count() const;
   Keyframe& keyframe(int slot) { return keyframes_[static_cast<std::size_t>(slot)]; }
   const Keyframe& keyframe(int slot) const { return keyframes_[static_cast<std::size_t>(slot)]; }
   std::span<WindowPoint> points() { return points_; }
   std::span<const WindowPoint> points() const { return points_; }
 
-  // Swaps `image` into a free slot. The first keyframe's pose is held by the prior (it is the origin of the map).
+  // Swaps `image` into a free slot.
   int add_keyframe(std::int64_t stamp_ns, const CameraState& state, Pyramid& image);
   // False if the window is full or the pattern leaves the host image.
   bool add_point(const Patch& patch, float prior_information);
@@ -87,11 +87,15 @@ class Window {
     int points = 0;
     bool ok = true;  // false: a step was not finite; the window must be given up
   };
+  // Residuals and prior know relative poses alone; the oldest keyframe holds the window in place. (As part of the prior
+  // an absolute pose does not stay consistent: first estimates of old keyframes do not follow a shift of the whole
+  // window, those of new ones do, and the shift feeds itself.)
   Stats optimise(int iterations);
 
   // Moves points that no longer help and then the whole keyframe into the prior.
   void marginalise(int slot);
-  // The keyframe DSO's distance score gives up, never one of the two newest.
+  // The keyframe to give up, never one of the two newest: one with hardly any points left, else by DSO's distance
+  // score (which would keep the former for ever: what is far from all others crowds nobody).
   int least_useful() const;
   // Points whose host stays but which neither of the two newest keyframes sees: into the prior.
   void retire_points();

@@ -10,6 +10,8 @@ namespace {
 
 using Block = Eigen::Matrix<double, state_size, state_size>;
 
+constexpr double min_points_share = 0.05;  // of the points a keyframe hosted (DSO)
+
 }  // namespace
 
 void eliminate_block(Window::Matrix& H, Window::Vector& g, int at) {
@@ -106,10 +108,13 @@ int Window::least_useful() const {
   const auto distance = [this](int i, int j) {
     return (keyframe(i).state.T_cw.inverse().translation() - keyframe(j).state.T_cw.inverse().translation()).norm();
   };
+  std::array<int, max_keyframes> points{};
+  for (const WindowPoint& point : points_) ++points[static_cast<std::size_t>(point.patch.host)];
   int worst = -1;
   double worst_score = -1.0;
   for (int i = 0; i < max_keyframes; ++i) {
     if (!keyframe(i).used || i == newest_ || i == second) continue;
+    if (points[static_cast<std::size_t>(i)] <= min_points_share * keyframe(i).hosted) return i;
     double crowding = 0.0;
     for (int j = 0; j < max_keyframes; ++j) {
       if (keyframe(j).used && j != i && j != newest_ && j != second) crowding += 1.0 / (distance(i, j) + 1e-5);

@@ -223,13 +223,42 @@ TEST(Window, MarginalisationKeepsWhatWasKnown) {
   with.window.marginalise(0);
   with.window.marginalise(1);
   EXPECT_EQ(with.window.count(), 3);
+  const Pose oldest = with.window.keyframe(2).state.T_cw;
+  EXPECT_EQ(with.window.oldest(), 2);
   with.window.optimise(8);
-  // The prior holds the remaining ones in the world although the origin is gone.
+  EXPECT_EQ((with.window.keyframe(2).state.T_cw.matrix() - oldest.matrix()).norm(), 0.0);
+  // The remaining ones stay where they were although the origin is gone, and the oldest exactly.
   EXPECT_LT(se3_log(with.window.keyframe(4).state.T_cw * newest.inverse()).norm(), 0.02);
   EXPECT_GT(before.translation().norm(), 0.5);
   // And the prior is positive semidefinite.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(with.window.prior_H());
   EXPECT_GT(eigen.eigenvalues().minCoeff(), -1e-6 * eigen.eigenvalues().maxCoeff());
+}
+
+// An absolute pose in the prior would not follow when the window moves, and drive it on.
+TEST(Window, ThePriorKnowsRelativePosesAlone) {
+  Toy toy;
+  for (int i = 0; i < 5; ++i) toy.add(0.15 * i, 0.01, 0.05, 1, 0.3);
+  toy.window.optimise(8);
+  toy.window.marginalise(0);
+  toy.window.marginalise(1);
+  Window::Vector rigid = Window::Vector::Zero();
+  const Vector6d twist = (Vector6d() << 0.3, -0.2, 0.5, 0.1, 0.2, -0.1).finished();
+  for (int s = 2; s < 5; ++s) rigid.segment<6>(s * state_size) = se3_adjoint(toy.window.keyframe(s).first.T_cw) * twist;
+  const Window::Matrix& H = toy.window.prior_H();
+  EXPECT_GT(H.norm(), 1.0);
+  EXPECT_LT(std::abs(rigid.dot(H * rigid)), 1e-4 * rigid.cwiseAbs2().dot(H.diagonal()));
+}
+
+TEST(Window, AKeyframeLeftFarBehindIsGivenUpFirst) {
+  Toy toy;
+  Pyramid image = toy.window.keyframe(0).image;
+  image.allocate(320, 256);
+  CameraState far;
+  far.T_cw.translation().z() = 100.0;
+  toy.window.add_keyframe(0, far, image);
+  for (int i = 0; i < 4; ++i) toy.add(0.15 * i, 0, 0, 1, 0.3);
+  EXPECT_EQ(toy.window.least_useful(), 0);
 }
 
 TEST(Window, RescalingChangesNothingThePixelsSee) {
