@@ -6,7 +6,8 @@ namespace adit::thermal_odometry {
 namespace {
 constexpr std::int64_t max_extrapolation_ns = 200'000'000;
 constexpr std::int64_t max_newer_ns = 50'000'000;
-constexpr int bins = 16;  // poses across the duration of a cloud
+constexpr std::int64_t max_cubic_ns = 250'000'000;  // that four poses may span
+constexpr int bins = 16;                            // poses across the duration of a cloud
 }  // namespace
 
 void PoseHistory::add(std::int64_t stamp_ns, const Pose& T_cw) {
@@ -26,12 +27,34 @@ std::optional<Pose> PoseHistory::at(std::int64_t stamp_ns) const {
   for (std::size_t age = 1; age < count_; ++age) {
     const Entry& before = entry(age);
     if (before.stamp_ns > stamp_ns) continue;
-    const Entry& after = entry(age - 1);
-    const double fraction =
-        static_cast<double>(stamp_ns - before.stamp_ns) / static_cast<double>(after.stamp_ns - before.stamp_ns);
-    return se3_interpolate(before.T_cw, after.T_cw, fraction);
+    return curved(stamp_ns, age);
   }
   return std::nullopt;
+}
+
+// Between entry(age) and the next newer one: the cubic through four poses about them in the tangent space of one (what
+// shakes a body, a gait of 5 Hz, is not straight between frames), or a straight line where there are no four.
+Pose PoseHistory::curved(std::int64_t stamp_ns, std::size_t age) const {
+  const Entry& before = entry(age);
+  const Entry& after = entry(age - 1);
+  const std::size_t newest = age >= 2 ? age - 2 : 0;
+  if (newest + 3 >= count_ || entry(newest).stamp_ns - entry(newest + 3).stamp_ns > max_cubic_ns) {
+    return se3_interpolate(
+        before.T_cw, after.T_cw,
+        static_cast<double>(stamp_ns - before.stamp_ns) / static_cast<double>(after.stamp_ns - before.stamp_ns));
+  }
+  const auto at = [&](std::size_t k) { return static_cast<double>(entry(newest + k).stamp_ns - before.stamp_ns); };
+  const auto t = static_cast<double>(stamp_ns - before.stamp_ns);
+  const Pose T_wb = before.T_cw.inverse();
+  Vector6d x = Vector6d::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    double weight = 1.0;  // Lagrange
+    for (std::size_t j = 0; j < 4; ++j) {
+      if (j != i) weight *= (t - at(j)) / (at(i) - at(j));
+    }
+    x += weight * se3_log(entry(newest + i).T_cw * T_wb);
+  }
+  return se3_exp(x) * before.T_cw;
 }
 
 CloudBuffer::CloudBuffer(std::size_t capacity, double max_age_s) : capacity_(capacity), max_age_s_(max_age_s) {

@@ -18,7 +18,7 @@ class PoseHistory {
  public:
   void add(std::int64_t stamp_ns, const Pose& T_cw);  // stamps strictly increasing
   void clear() { count_ = 0; }
-  // Constant-twist interpolation; up to 0.2 s beyond the newest by the newest twist; nothing before the oldest.
+  // Cubic interpolation; up to 0.2 s beyond the newest by the newest twist; nothing before the oldest.
   std::optional<Pose> at(std::int64_t stamp_ns) const;
   std::size_t size() const { return count_; }
 
@@ -27,6 +27,7 @@ class PoseHistory {
     std::int64_t stamp_ns;
     Pose T_cw;
   };
+  Pose curved(std::int64_t stamp_ns, std::size_t age) const;
   const Entry& entry(std::size_t age) const { return ring_[(next_ + ring_.size() - 1 - age) % ring_.size()]; }
   std::array<Entry, 64> ring_;
   std::size_t next_ = 0;

@@ -12,6 +12,11 @@ namespace adit::thermal_odometry {
 namespace {
 
 constexpr int usual_top = 3;  // coarsest level without a gap
+// How wrong the foreseen spin is: running mean over about so many frames, at least, at most, and after a gap [rad/s].
+constexpr double spin_memory = 10.0;
+constexpr double min_spin_sigma = 0.005;
+constexpr double max_spin_sigma = 1.0;
+constexpr double unknown_spin_sigma = 0.1;
 
 std::optional<Tracker::PosePrior> pose_prior(const Prior* prior, const Pose& T_cw) {
   if (prior == nullptr || !prior->T_previous_current.matrix().allFinite() || !prior->covariance.allFinite())
@@ -43,8 +48,11 @@ FrameAligner::Alignment FrameAligner::align(const Tracker& tracker, const Pyrami
   CameraState start = state_;
   start.T_cw = out.predicted;
   if (out.gap) start.a = reference_gain;
-  Tracker::Before before{state_.T_cw, out.dt, Vector6d::Zero()};
-  if (has_velocity_ && !out.gap) before.rate_change = velocity_change_;
+  Tracker::Before before{state_.T_cw, out.dt, Vector6d::Zero(), unknown_spin_sigma};
+  if (has_velocity_ && !out.gap) {
+    before.rate_change = velocity_change_;
+    before.spin_sigma = std::clamp(std::sqrt(spin_variance_), min_spin_sigma, max_spin_sigma);
+  }
   double best_cost = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count && count > 1; ++i) {
     CameraState candidate = start;
@@ -90,8 +98,14 @@ TrackResult FrameAligner::search(const Tracker& tracker, const Pyramid& image, c
 void FrameAligner::move_to(std::int64_t stamp_ns, const CameraState& state) {
   const double dt = 1e-9 * static_cast<double>(stamp_ns - stamp_ns_);
   const Vector6d velocity = se3_log(state.T_cw * state_.T_cw.inverse()) / dt;
+  const Vector6d foreseen = velocity_change_;
   velocity_change_.setZero();
-  if (has_velocity_ && dt < config_.gap_s) velocity_change_ = 0.5 * (velocity - velocity_);
+  if (has_velocity_ && dt < config_.gap_s) {
+    velocity_change_ = 0.5 * (velocity - velocity_);
+    // At the last frame the rate was between those of the intervals beside it.
+    const double missed = (velocity_change_ - foreseen).tail<3>().squaredNorm() / 3.0;
+    spin_variance_ += (missed - spin_variance_) / spin_memory;
+  }
   set_velocity(velocity);
   correct(state);
   stamp_ns_ = stamp_ns;

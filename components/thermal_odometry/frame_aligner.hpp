@@ -57,6 +57,7 @@ class FrameAligner {
   bool has_velocity_ = false;
   Vector6d velocity_ = Vector6d::Zero();         // mean of the last interval
   Vector6d velocity_change_ = Vector6d::Zero();  // from the middle of an interval to its end
+  double spin_variance_ = 0.0;                   // of the spin foreseen so for a frame [rad2/s2]
 };
 
 }  // namespace adit::thermal_odometry

@@ -10,6 +10,8 @@ namespace adit::thermal_odometry {
 namespace {
 
 constexpr int max_views = 8;
+constexpr double no_spin = 1e-6;  // rad/s: holds the spin where nothing may be said of it
+using Matrix6f = Eigen::Matrix<float, 6, 6>;
 }  // namespace
 
 Tracker::Tracker(const Pinhole& camera, int levels, std::size_t capacity, const Config& config)
@@ -55,8 +57,8 @@ Tracker::System Tracker::linearise(const Pyramid& pyramid, const CameraState& st
   const float nu = config_.nu;
   PatchView view;
 
-  Matrix8f block = Matrix8f::Zero();
-  Vector8f block_g = Vector8f::Zero();
+  Eigen::Matrix<float, states, states> block = Eigen::Matrix<float, states, states>::Zero();
+  Eigen::Matrix<float, states, 1> block_g = Eigen::Matrix<float, states, 1>::Zero();
   float block_cost = 0.0F;
   float block_scale = 0.0F;
   int in_block = 0;
@@ -111,19 +113,28 @@ Tracker::System Tracker::linearise(const Pyramid& pyramid, const CameraState& st
     affine << (wgx * ja).sum(), -wgx.sum(), (wgy * ja).sum(), -wgy.sum();
     const Eigen::Matrix<float, 2, 6> J =
         pixel_jacobian(warp.fx, warp.fy, view.x, view.y, patch.inverse_depth * view.rho);
-    block.topLeftCorner<6, 6>().noalias() += J.transpose() * (G * J);
-    block.topRightCorner<6, 2>().noalias() += J.transpose() * affine;
-    block_g.head<6>().noalias() += J.transpose() * gr;
+    const Matrix6f by_pose = J.transpose() * (G * J);
+    const Eigen::Matrix<float, 6, 2> by_affine = J.transpose() * affine;
+    const Eigen::Matrix<float, 6, 1> gradient = J.transpose() * gr;
+    block.topLeftCorner<6, 6>() += by_pose;
+    block.block<6, 2>(0, 6) += by_affine;
+    block_g.head<6>() += gradient;
     block(6, 6) += (w * ja.square()).sum();
     block(6, 7) -= (w * ja).sum();
     block(7, 7) += w.sum();
     block_g[6] += (w * ja * r).sum();
     block_g[7] -= (w * r).sum();
+    if (warp.rolling) {
+      const float later = warp.row_time * (warp.fy * view.y + warp.cy - warp.middle_row);
+      block.block<6, 3>(0, 8) += later * by_pose.rightCols<3>();
+      block.block<2, 3>(6, 8) += later * by_affine.bottomRows<3>().transpose();
+      block.bottomRightCorner<3, 3>() += later * later * by_pose.bottomRightCorner<3, 3>();
+      block_g.tail<3>() += later * gradient.tail<3>();
+    }
     if (++in_block == 64) flush();
   }
   flush();
-  system.H.bottomLeftCorner<2, 6>() = system.H.topRightCorner<6, 2>().transpose();
-  system.H(7, 6) = system.H(6, 7);
+  system.H = system.H.selfadjointView<Eigen::Upper>().toDenseMatrix();
   if (system.pixels > 0) {
     system.scale /= system.pixels;
     system.cost /= system.pixels;
@@ -238,9 +249,20 @@ TrackResult Tracker::track(const Pyramid& image, const CameraState& start, int t
   const int top = std::min(top_level, levels_ - 1);
   const double reference_a = views_[static_cast<std::size_t>(newest_)].state.a;
   CameraState state = start;
+  Eigen::Vector3d spin = Eigen::Vector3d::Zero();  // rad/s, beyond what follows from `before`
+  const double spin_sigma = std::max(before != nullptr ? before->spin_sigma : 0.0, no_spin);
+  const double spin_information = 1.0 / (spin_sigma * spin_sigma);
+  const auto add_priors = [&](System& system) {
+    const double gain_information = 1.0 / (config_.gain_sigma * config_.gain_sigma);
+    system.H(6, 6) += gain_information;
+    system.g[6] += gain_information * (state.a - reference_a);
+    system.H.diagonal().tail<3>().array() += spin_information;
+    system.g.tail<3>() += spin_information * spin;
+  };
   const auto update_rate = [&] {
     if (before == nullptr || camera_.row_time == 0.0) return;
     state.rate = se3_log(state.T_cw * before->T_cw.inverse()) / before->dt + before->rate_change;
+    state.rate.tail<3>() += spin;
   };
   update_rate();
   state.b += median_offset(image, state, top);
@@ -251,21 +273,20 @@ TrackResult Tracker::track(const Pyramid& image, const CameraState& start, int t
       system = linearise(image, state, level, sigma, true);
       if (system.points < config_.min_points / 2) return result;
       sigma = std::clamp(static_cast<float>(std::sqrt(system.scale)), config_.min_sigma, config_.max_sigma);
-      Eigen::Matrix<double, 8, 8> H = system.H;
-      Eigen::Matrix<double, 8, 1> g = system.g;
-      const double gain_information = 1.0 / (config_.gain_sigma * config_.gain_sigma);
-      H(6, 6) += gain_information;
-      g[6] += gain_information * (state.a - reference_a);
+      add_priors(system);
+      Matrix& H = system.H;
+      Vector& g = system.g;
       if (prior != nullptr) {
         H.topLeftCorner<6, 6>() += prior->information;
         g.head<6>() += prior->information * se3_log(state.T_cw * prior->T_cw.inverse());
       }
       H.diagonal() *= 1.0001;
-      const Eigen::Matrix<double, 8, 1> step = -H.ldlt().solve(g);
+      const Vector step = -H.ldlt().solve(g);
       if (!step.allFinite() || step.head<6>().norm() > 10.0) return result;
       state.T_cw = se3_exp(step.head<6>()) * state.T_cw;
       state.a += step[6];
       state.b += step[7];
+      spin += step.tail<3>();
       update_rate();
       if (step.head<3>().norm() < config_.stop_translation && step.segment<3>(3).norm() < config_.stop_rotation) break;
     }
@@ -281,9 +302,13 @@ TrackResult Tracker::track(const Pyramid& image, const CameraState& start, int t
   result.inlier_share = static_cast<float>(system.inliers) / static_cast<float>(std::max(1, system.pixels));
   result.correlation = correlation(image, state, finest);
   result.median_flow = median_flow(state);
-  const Eigen::Matrix2d Haa = system.H.bottomRightCorner<2, 2>() + 1e-6 * Eigen::Matrix2d::Identity();
-  result.information = system.H.topLeftCorner<6, 6>() -
-                       system.H.topRightCorner<6, 2>() * Haa.inverse() * system.H.bottomLeftCorner<2, 6>();
+  // Brightness and spin marginalised; the prior on the spin is part of what the rows mean.
+  system.H.diagonal().tail<5>().array() += 1e-6;
+  system.H.diagonal().tail<3>().array() += spin_information;
+  const Eigen::Matrix<double, 6, 5> cross = system.H.topRightCorner<6, 5>();
+  result.information =
+      system.H.topLeftCorner<6, 6>() - cross * system.H.bottomRightCorner<5, 5>().ldlt().solve(cross.transpose());
+  result.information = 0.5 * (result.information + result.information.transpose()).eval();
   result.ok = state.T_cw.matrix().allFinite() && system.points >= config_.min_points &&
               result.visible_share >= config_.min_visible_share && result.inlier_share >= config_.min_inlier_share &&
               result.correlation >= config_.min_correlation && result.sigma < 1.5F * config_.max_sigma;

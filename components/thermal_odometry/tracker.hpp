@@ -72,6 +72,7 @@ class Tracker {
     Pose T_cw = Pose::Identity();
     double dt = 0.0;                          // s
     Vector6d rate_change = Vector6d::Zero();  // from the middle of the interval to its end, as it was last time
+    double spin_sigma = 0.0;  // rad/s, by which that may be wrong: the rows say the rest; 0: it is right
   };
   // From `start` at `top_level` down to the finest. The brightness offset of `start` is replaced by the median residual
   // at the top level, which alone absorbs the jump of a flat-field correction.
@@ -79,11 +80,13 @@ class Tracker {
                     const Before* before = nullptr) const;
 
  private:
-  using Matrix8f = Eigen::Matrix<float, 8, 8>;
-  using Vector8f = Eigen::Matrix<float, 8, 1>;
+  // [translation, rotation, a, b, spin]: the last is what a rolling readout turns by more than foreseen [rad/s].
+  static constexpr int states = 11;
+  using Matrix = Eigen::Matrix<double, states, states>;
+  using Vector = Eigen::Matrix<double, states, 1>;
   struct System {
-    Eigen::Matrix<double, 8, 8> H = Eigen::Matrix<double, 8, 8>::Zero();
-    Eigen::Matrix<double, 8, 1> g = Eigen::Matrix<double, 8, 1>::Zero();
+    Matrix H = Matrix::Zero();
+    Vector g = Vector::Zero();
     double cost = 0.0;
     double scale = 0.0;
     int pixels = 0;
