@@ -9,6 +9,8 @@
 #include <optional>
 #include <random>
 
+#include <Eigen/Cholesky>
+
 #include "components/thermal_odometry/test_data.hpp"
 #include "components/thermal_odometry/thermal_odometry.hpp"
 
@@ -145,6 +147,33 @@ struct Mean {
   double get() const { return n > 0 ? sum / n : 0.0; }
 };
 
+// How the errors of the motion over `lag` frames compare with the sum of the steps' covariances, direction by direction
+// (right increment in camera axes: x right, y down, z ahead; then the turns about them): 1 is honest.
+void print_consistency(const std::vector<Pose>& estimates, const std::vector<Pose>& truths,
+                       const std::vector<Matrix6d>& steps, std::size_t lag) {
+  Vector6d normalised = Vector6d::Zero(), squares = Vector6d::Zero(), variances = Vector6d::Zero();
+  double whole = 0.0;
+  int n = 0;
+  for (std::size_t i = 0; i + lag < estimates.size(); i += std::max<std::size_t>(1, lag / 3), ++n) {
+    const Pose estimated = estimates[i].inverse() * estimates[i + lag];
+    const Vector6d error = se3_log((truths[i].inverse() * truths[i + lag]).inverse() * estimated);
+    Matrix6d covariance = Matrix6d::Zero();
+    for (std::size_t k = i + 1; k <= i + lag; ++k) {
+      const Matrix6d carry = se3_adjoint(estimates[i + lag].inverse() * estimates[k]);
+      covariance += carry * steps[k] * carry.transpose();
+    }
+    normalised += (error.array().square() / covariance.diagonal().array()).matrix();
+    squares += error.cwiseAbs2();
+    variances += covariance.diagonal();
+    whole += error.dot(covariance.ldlt().solve(error)) / 6.0;
+  }
+  if (n == 0) return;
+  const auto rms = [n](double sum) { return 1e3 * std::sqrt(sum / n); };
+  std::printf("  NEES/dof over %3zu frames %6.2f; by direction (error/sigma, mm or mrad):", lag, whole / n);
+  for (int d = 0; d < 6; ++d) std::printf(" %.2f (%.2f/%.2f)", normalised[d] / n, rms(squares[d]), rms(variances[d]));
+  std::printf("\n");
+}
+
 int study(const Options& options) {
   const std::filesystem::path path(options.folder);
   std::optional<Folder> folder = open(path);
@@ -166,6 +195,7 @@ int study(const Options& options) {
   std::normal_distribution<double> normal;
   std::vector<Pose> estimates, truths;
   std::vector<double> seconds;
+  std::vector<Matrix6d> steps;  // covariances
   std::vector<Eigen::Vector3f> points;
   std::vector<float> offsets, values;
   Mean frame_ms, keyframe_ms;
@@ -218,6 +248,7 @@ int study(const Options& options) {
     if (!truths.empty()) path_length += (truth->translation() - truths.back().translation()).norm();
     estimates.push_back(estimate.T_odom_camera);
     truths.push_back(*truth);
+    steps.push_back(estimate.step_covariance);
     seconds.push_back(t);
     error = ((estimates[0].inverse() * estimates.back()).translation() -
              (truths[0].inverse() * truths.back()).translation())
@@ -257,6 +288,9 @@ int study(const Options& options) {
     std::printf(
         "  FFC: %d events, %d frozen frames, %d of them measured; %d recovered, at the latest with live frame %d\n",
         shutter.events, shutter.frozen, shutter.frozen_measured, shutter.recovered, shutter.longest);
+  }
+  if (!options.mono) {
+    for (std::size_t lag : {1, 6, 30, 150}) print_consistency(estimates, truths, steps, lag);
   }
   if (outage >= 0.0) std::printf("  without LiDAR: %.2f %% of its way\n", outage);
   return 0;
