@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "components/dataset/pcd_file.hpp"
 #include "components/dataset/png16.hpp"
 #include "components/dataset/png8.hpp"
 #include "components/dataset/point_file.hpp"
@@ -113,18 +112,6 @@ TEST_F(DatasetTest, BrokenPngIsRefusedWithAReason) {
   EXPECT_FALSE(write_png8(path("short.png"), {4, 2, 3, 0, bytes}));
   EXPECT_FALSE(write_png8(path("none.png"), {}));
   EXPECT_FALSE(write_png8(path("nowhere/picture.png"), {10, 2, 1, 0, bytes}));
-}
-
-TEST_F(DatasetTest, PcdFieldsComeInTheStandardOrder) {
-  write("a.pcd",
-        "VERSION 0.7\nFIELDS ring t x y z intensity\nSIZE 2 4 4 4 4 4\nTYPE U U F F F F\nCOUNT 1 1 1 1 1 1\nWIDTH 2\n"
-        "HEIGHT 1\nPOINTS 2\nDATA ascii\n5 1000000 1 2 3 9\n6 2000000 4 5 6 8\n");
-  const Result<PointFile> cloud = read_pcd(path("a.pcd"));
-  ASSERT_TRUE(cloud) << cloud.error().message;
-  EXPECT_THAT(cloud->fields, testing::ElementsAre("x", "y", "z", "intensity", "time", "ring"));
-  EXPECT_THAT(cloud->values, testing::ElementsAre(1, 2, 3, 9, 0.001f, 5, 4, 5, 6, 8, 0.002f, 6));
-  write("b.pcd", "nonsense");
-  EXPECT_FALSE(read_pcd(path("b.pcd")));
 }
 
 TEST(SharedData, EveryRecordedFolderOpens) {
