@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "bringup/commands/rig_file.hpp"
 #include "components/dataset_player/recorded_messages.hpp"
 #include "components/runtime/stamp.hpp"
 
@@ -46,31 +47,18 @@ Result<void> read_calibration(const fs::path& path, ThermalFolder& folder) {
   return {};
 }
 
-// The simulator's extrinsics.yaml: "name:" and four rows "- [a, b, c, d]", or "name: number".
 Result<void> read_rig(const fs::path& path, ThermalFolder& folder) {
-  std::ifstream file(path);
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
-    const auto value_of = [&line](const char* name) { return std::atof(line.c_str() + std::string(name).size()); };
-    if (line.starts_with("thermal_row_time:")) folder.row_time = value_of("thermal_row_time:");
-    if (line.starts_with("thermal_time_constant:")) folder.time_constant = value_of("thermal_time_constant:");
-    const char* name = line.starts_with("T_base_thermal:") ? "thermal_pose"
-                       : line.starts_with("T_base_lidar:") ? "lidar_pose"
-                                                           : nullptr;
-    if (name == nullptr) continue;
-    Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
-    for (int row = 0; row < 4; ++row, ++number) {
-      const bool read =
-          std::getline(file, line) && std::sscanf(line.c_str(), " - [%lf, %lf, %lf, %lf]", &matrix(row, 0),
-                                                  &matrix(row, 1), &matrix(row, 2), &matrix(row, 3)) == 4;
-      if (!read) {
-        return Error{ErrorCode::malformed,
-                     path.string() + ":" + std::to_string(number + 1) + ": 4 rows '- [a, b, c, d]' are wanted"};
-      }
+  const Result<RigFile> rig = read_rig_file(path.string());
+  if (!rig) return rig.error();
+  for (const auto& [name, value] : rig->numbers) {
+    if (name == "thermal_row_time") folder.row_time = value;
+    if (name == "thermal_time_constant") folder.time_constant = value;
+  }
+  for (const auto& [matrix, parameter] :
+       {std::pair{"T_base_thermal", "thermal_pose"}, {"T_base_lidar", "lidar_pose"}}) {
+    if (const auto pose = rig->poses.find(matrix); pose != rig->poses.end()) {
+      folder.parameters.emplace_back(parameter, pose_parameter(pose->second));
     }
-    const Eigen::Quaterniond q(Eigen::Matrix3d(matrix.topLeftCorner<3, 3>()));
-    const std::array<double, 7> pose{matrix(0, 3), matrix(1, 3), matrix(2, 3), q.x(), q.y(), q.z(), q.w()};
-    folder.parameters.emplace_back(name, list_of(pose));
   }
   return {};
 }

@@ -2,7 +2,23 @@
 
 #include <algorithm>
 
+#include <Eigen/Cholesky>
+
 namespace adit::lidar_odometry {
+
+Prior combined(const Prior& first, const Prior& second) {
+  Prior result = first;
+  if (!result.twist) result.twist = second.twist;
+  const Matrix6d information = first.information + second.information;
+  // What neither knows stays as the first has it.
+  const Matrix6d regular = information + Matrix6d(1e-9 * information.trace() * Matrix6d::Identity());
+  const Vector6d step = regular.ldlt().solve(second.information * se3_log(first.pose.inverse() * second.pose));
+  if (!step.allFinite() || !(information.trace() > 0.0)) return result;
+  result.information = information;
+  result.pose = first.pose * se3_exp(step);
+  result.pose.linear() = orthonormalized(result.pose.linear());
+  return result;
+}
 
 std::string_view to_string(Status status) {
   switch (status) {

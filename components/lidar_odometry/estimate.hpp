@@ -6,13 +6,14 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 
-#include "components/geometry/se3.hpp"
+#include "components/geometry/trajectory.hpp"
 
 namespace adit::lidar_odometry {
 
-// Prediction of the pose at LidarOdometry::reference_stamp_ns(cloud), e.g. by a filter, wheels or an IMU.
+// Prediction of the pose at LidarOdometry::stamps(cloud).reference_ns, e.g. by a filter, wheels or an IMU.
 struct Prior {
   enum class Kind {
     increment,  // pose = T_last_now: motion since the instant of the last estimate
@@ -24,7 +25,13 @@ struct Prior {
   Matrix6d information = Matrix6d::Zero();
   // Velocity [m/s; rad/s] in the sensor frame during this sweep, for the motion compensation. Nothing: from the pose.
   std::optional<Vector6d> twist;
+  // Poses of the sensor during this sweep in any fixed frame, from its first to its last point, e.g. of an IMU, for the
+  // motion compensation instead of a twist. Not kept. Poses that do not reach over the sweep are ignored and counted.
+  std::span<const StampedPose> sweep;
 };
+
+// Two increments that know of each other nothing, as one: each direction by its information, the sweep of the first.
+Prior combined(const Prior& first, const Prior& second);
 
 enum class Status : std::uint8_t {
   initialising,    // the first cloud: it is the map now
@@ -76,7 +83,7 @@ struct TotalCounters {
   std::uint64_t refused = 0;  // too_few_points, bad_stamp, bad_cloud
   std::uint64_t lost = 0;
   std::uint64_t restarts = 0;
-  std::uint64_t bad_priors = 0;  // not finite or not a rigid motion: ignored
+  std::uint64_t bad_priors = 0;  // not finite, not rigid, or not over the sweep: ignored
 };
 
 struct Estimate {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "components/geometry/rigid.hpp"
 #include "components/lidar_odometry/localizability.hpp"
 #include "components/lidar_odometry/point_odometry.hpp"
 #include "components/lidar_odometry/surfel_odometry.hpp"
@@ -13,13 +14,8 @@ constexpr double ns = 1e-9;
 // Clouds with stamps that go on from each other before a clock that was set back is believed.
 constexpr int stamps_to_believe = 3;
 
-// Finite, and the rotation is one within what single precision leaves.
 bool usable(const Prior& prior) {
-  const Eigen::Matrix3d r = prior.pose.linear();
-  const bool twist_finite = !prior.twist || prior.twist->allFinite();
-  return prior.pose.matrix().allFinite() && prior.information.allFinite() && twist_finite &&
-         (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-3 && r.determinant() > 0.0 &&
-         prior.pose.translation().norm() < 1e7;
+  return is_rigid(prior.pose) && prior.information.allFinite() && (!prior.twist || prior.twist->allFinite());
 }
 
 std::unique_ptr<Pipeline> make_pipeline(const Config& config, WorkerPool& pool) {
@@ -121,6 +117,13 @@ void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
     task.twist = *prior->twist;
     task.external_twist = true;
   }
+  if (prior != nullptr && !prior->sweep.empty() && config.deskew && task.times) {
+    if (follows(prior->sweep, cloud.stamp_ns, *task.times)) {
+      task.sampled = SweepMotion(prior->sweep, cloud.stamp_ns, *task.times, task.reference_time);
+    } else {
+      ++estimate.total.bad_priors;
+    }
+  }
   task.prediction.linear() = orthonormalized(task.prediction.linear());
 
   pipeline->process(task, estimate);
@@ -173,9 +176,14 @@ const Estimate& LidarOdometry::process(const Cloud& cloud, const Prior* prior) {
   return impl_->estimate;
 }
 
-std::int64_t LidarOdometry::reference_stamp_ns(const Cloud& cloud) const {
-  if (!consistent(cloud)) return cloud.stamp_ns;
-  return cloud.stamp_ns + std::llround(impl_->reference_time(time_span(cloud)) / ns);
+SweepStamps LidarOdometry::stamps(const Cloud& cloud) const {
+  SweepStamps stamps{cloud.stamp_ns, cloud.stamp_ns, cloud.stamp_ns};
+  const std::optional<TimeSpan> times = consistent(cloud) ? time_span(cloud) : std::nullopt;
+  if (!times) return stamps;
+  stamps.first_ns += std::llround(times->first / ns);
+  stamps.last_ns += std::llround(times->last / ns);
+  stamps.reference_ns += std::llround(impl_->reference_time(times) / ns);
+  return stamps;
 }
 
 const Estimate& LidarOdometry::estimate() const {

@@ -12,6 +12,11 @@
 
 namespace adit::lidar_odometry {
 
+struct SweepStamps {
+  std::int64_t first_ns, last_ns;  // of its points; the cloud's stamp if it has no usable times
+  std::int64_t reference_ns;       // of the pose
+};
+
 class LidarOdometry {
  public:
   // Precondition: check(config) succeeds.
@@ -25,8 +30,8 @@ class LidarOdometry {
   // The first pose is the identity, or the first prior if that is absolute.
   const Estimate& process(const Cloud& cloud, const Prior* prior = nullptr);
 
-  // The instant that the pose of this cloud will refer to: ask the predicting filter for this time.
-  std::int64_t reference_stamp_ns(const Cloud& cloud) const;
+  // When this cloud was measured and the instant that its pose will refer to: ask a predicting filter for these times.
+  SweepStamps stamps(const Cloud& cloud) const;
 
   // The last estimate.
   const Estimate& estimate() const;

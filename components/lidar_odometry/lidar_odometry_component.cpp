@@ -5,12 +5,14 @@
 #include "adit_msgs/msg/localizability.hpp"
 #include "components/geometry/trajectory.hpp"
 #include "components/lidar_odometry/config.hpp"
+#include "components/lidar_odometry/inertial_predictor.hpp"
 #include "components/lidar_odometry/lidar_odometry.hpp"
 #include "components/lidar_odometry/motion_prior.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
 #include "idl/point_cloud_view.hpp"
 #include "nav_msgs/msg/odometry.hpp"
+#include "sensor_msgs/msg/imu.hpp"
 #include "sensor_msgs/msg/point_cloud2.hpp"
 
 namespace adit {
@@ -20,7 +22,10 @@ using lidar_odometry::Direction;
 using lidar_odometry::Mode;
 using nav_msgs::msg::Odometry;
 using LocalizabilityMessage = adit_msgs::msg::Localizability;
+using sensor_msgs::msg::Imu;
 using sensor_msgs::msg::PointCloud2;
+
+constexpr std::int64_t imu_silence_ns = 500'000'000;  // then no cloud waits for the IMU
 
 // What `prior` is. guess: recorded poses of the sensor at the instants of the clouds, which wait for them; the
 // registration starts there and does not lean on them. pose, velocity: a live odometry; its poses' differences, or its
@@ -58,8 +63,13 @@ class LidarOdometryComponent final : public Component {
       "covariance"};
   Param<double> prior_timeout_{*this,        "prior_timeout",   1.0,
                                Unit::second, Range{0.01, 60.0}, "kind guess: a cloud waits this long for its prior"};
+  Param<bool> use_imu_{*this, "use_imu", false, "motion within and between sweeps from the IMU at `imu`"};
+  Param<std::vector<double>> imu_pose_{*this, "imu_pose", std::vector<double>{0, 0, 0, 0, 0, 0, 1},
+                                       "of the IMU in the same frame as lidar_pose: x y z [m], x y z w"};
+  Param<double> imu_timeout_{*this,        "imu_timeout",    0.1,
+                             Unit::second, Range{0.0, 10.0}, "a cloud waits this long for the IMU's last sample"};
   Param<std::vector<double>> lidar_pose_{*this, "lidar_pose", std::vector<double>{0, 0, 0, 0, 0, 0, 1},
-                                         "of the LiDAR in the frame that a live prior moves: x y z [m], x y z w"};
+                                         "of the LiDAR in base_link: x y z [m], x y z w"};
   Param<double> prior_velocity_sigma_{
       *this, "prior_velocity_sigma", 0.0, Unit::metre_per_second, Range{0.0, 100.0}, "0: the covariance of its twist"};
   Param<double> prior_rate_sigma_{
@@ -71,12 +81,18 @@ class LidarOdometryComponent final : public Component {
                              [this](CloudPointer cloud, const MessageInfo&) { on_cloud(std::move(cloud)); }};
   Input<Odometry> prior_{*this, "prior", Qos::reliable(100), Queue{100, WhenFull::drop_oldest},
                          [this](const Odometry& message, const MessageInfo&) { on_prior(message); }};
+  Input<Imu> imu_{*this, "imu", Qos::sensor(), Queue{500, WhenFull::drop_oldest},
+                  [this](const Imu& message, const MessageInfo&) { on_imu(message); }};
   Timer overdue_{*this, "overdue", std::chrono::milliseconds(100), [this] { process_waiting(); }};
 
-  // A cloud that waits for the prior of its instant.
+  // A cloud that may wait for the prior of its instant and for the IMU's samples. `cloud` and `stamps` of the first one
+  // only: it is the one in the buffers.
   struct Waiting {
-    CloudPointer cloud;
-    Time until;
+    CloudPointer message;
+    Time arrived;
+    bool late = false;  // has waited long enough
+    std::optional<lidar_odometry::Cloud> cloud;
+    lidar_odometry::SweepStamps stamps{};
   };
   static constexpr std::size_t max_waiting = 8;
   static constexpr std::size_t max_priors = 1000;
@@ -92,6 +108,9 @@ class LidarOdometryComponent final : public Component {
   std::optional<std::int64_t> last_ns_;  // instant of the last estimate
   std::uint64_t refused_ = 0;
   std::uint64_t without_prior_ = 0;
+  lidar_odometry::InertialPredictor inertial_;
+  std::uint64_t without_imu_ = 0;
+  bool imu_missing_ = false;  // for the last cloud
 
   Result<void> configure() override;
   Result<void> activate() override;
@@ -99,10 +118,12 @@ class LidarOdometryComponent final : public Component {
   void on_time_jump(Duration) override;
   void on_cloud(CloudPointer cloud);
   void on_prior(const Odometry& message);
+  void on_imu(const Imu& message);
   void process_waiting();
+  bool complete(const Waiting& waiting) const;
   std::optional<lidar_odometry::Prior> prior_for(std::int64_t instant_ns, const std::optional<Pose>& guess) const;
   Result<lidar_odometry::Cloud> view(const PointCloud2& message);
-  void process(const PointCloud2& message);
+  void process(const Waiting& waiting);
   void publish(const lidar_odometry::Estimate& estimate, const std::string& frame_id);
   void publish_localizability(const lidar_odometry::Estimate& estimate, const std::string& frame_id);
   void report(const lidar_odometry::Estimate& estimate);
@@ -137,6 +158,9 @@ Result<void> LidarOdometryComponent::configure() {
   if (Result<void> valid = lidar_odometry::check(config); !valid) return valid;
   const Result<Pose> sensor = pose_of(lidar_pose_);
   if (!sensor) return sensor.error();
+  const Result<Pose> imu = pose_of(imu_pose_);
+  if (!imu) return imu.error();
+  inertial_ = lidar_odometry::InertialPredictor({.lidar_from_imu = sensor->inverse() * *imu});
   engine_.emplace(config);
   motion_ = lidar_odometry::MotionPrior({.sensor = *sensor,
                                          .differences = prior_kind_ == PriorKind::pose,
@@ -147,14 +171,14 @@ Result<void> LidarOdometryComponent::configure() {
 
 Result<void> LidarOdometryComponent::activate() {
   on_time_jump({});
-  refused_ = without_prior_ = 0;
+  refused_ = without_prior_ = without_imu_ = 0;
   return {};
 }
 
-// The last clouds go without the priors that did not come.
+// The last clouds go without what did not come.
 Result<void> LidarOdometryComponent::deactivate() {
-  for (const Waiting& waiting : waiting_) process(*waiting.cloud);
-  waiting_.clear();
+  for (Waiting& waiting : waiting_) waiting.late = true;
+  process_waiting();
   return {};
 }
 
@@ -164,17 +188,26 @@ void LidarOdometryComponent::on_time_jump(Duration) {
   priors_.clear();
   prior_at_last_.reset();
   motion_.clear();
+  inertial_.clear();
   last_ns_.reset();
 }
 
 void LidarOdometryComponent::on_cloud(CloudPointer cloud) {
-  if (!use_prior_ || prior_kind_ != PriorKind::guess) return process(*cloud);
-  const auto timeout = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(prior_timeout_.value()));
   if (waiting_.size() == max_waiting) {
-    process(*waiting_.front().cloud);
-    waiting_.pop_front();
+    waiting_.front().late = true;
+    process_waiting();
   }
-  waiting_.push_back({std::move(cloud), clock().now() + timeout});
+  waiting_.push_back({.message = std::move(cloud), .arrived = clock().now(), .cloud = std::nullopt});
+  process_waiting();
+}
+
+void LidarOdometryComponent::on_imu(const Imu& message) {
+  if (!use_imu_) return;
+  const auto& w = message.angular_velocity;
+  const auto& a = message.linear_acceleration;
+  inertial_.add({.stamp_ns = to_time(message.header.stamp).time_since_epoch().count(),
+                 .rate = {w.x, w.y, w.z},
+                 .acceleration = {a.x, a.y, a.z}});
   process_waiting();
 }
 
@@ -202,14 +235,41 @@ void LidarOdometryComponent::on_prior(const Odometry& message) {
   process_waiting();
 }
 
+// Has what it may wait for, or has waited long enough. An IMU that has been silent for long is not waited for.
+bool LidarOdometryComponent::complete(const Waiting& waiting) const {
+  if (waiting.late) return true;
+  const auto waited = [&](Time since, double timeout) {
+    return std::chrono::duration<double>(clock().now() - since).count() >= timeout;
+  };
+  if (use_prior_ && prior_kind_ == PriorKind::guess) {
+    const std::int64_t stamp = to_time(waiting.message->header.stamp).time_since_epoch().count();
+    const bool known = !priors_.empty() && priors_.back().stamp_ns >= stamp;
+    if (!known && !waited(waiting.arrived, prior_timeout_)) return false;
+  }
+  if (!use_imu_ || inertial_.empty()) return true;
+  // A recording may hand out a cloud before its last point was measured.
+  const Time end(Duration(waiting.stamps.last_ns));
+  const std::int64_t last = waiting.stamps.last_ns;
+  if (last < inertial_.next_ns() || last - inertial_.newest_ns() > imu_silence_ns) return true;
+  return waited(std::max(waiting.arrived, end), imu_timeout_);
+}
+
 void LidarOdometryComponent::process_waiting() {
   while (!waiting_.empty()) {
-    const std::int64_t stamp = to_time(waiting_.front().cloud->header.stamp).time_since_epoch().count();
-    const bool known = !priors_.empty() && priors_.back().stamp_ns >= stamp;
-    if (!known && clock().now() < waiting_.front().until) return;
-    const CloudPointer cloud = std::move(waiting_.front().cloud);
+    Waiting& first = waiting_.front();
+    if (!first.cloud) {
+      const Result<lidar_odometry::Cloud> cloud = view(*first.message);
+      if (!cloud) {
+        health(Health::warn, std::to_string(++refused_) + " clouds refused: " + cloud.error().message);
+        waiting_.pop_front();
+        continue;
+      }
+      first.cloud = *cloud;
+      first.stamps = engine_->stamps(*cloud);
+    }
+    if (!complete(first)) return;
+    process(first);
     waiting_.pop_front();
-    process(*cloud);
   }
 }
 
@@ -245,25 +305,28 @@ std::optional<lidar_odometry::Prior> LidarOdometryComponent::prior_for(std::int6
   return prior;
 }
 
-void LidarOdometryComponent::process(const PointCloud2& message) {
-  const Result<lidar_odometry::Cloud> cloud = view(message);
-  if (!cloud) {
-    health(Health::warn, std::to_string(++refused_) + " clouds refused: " + cloud.error().message);
-    return;
-  }
-  const std::int64_t instant = engine_->reference_stamp_ns(*cloud);
+void LidarOdometryComponent::process(const Waiting& waiting) {
+  const std::int64_t instant = waiting.stamps.reference_ns;
   const std::optional<Pose> guess = interpolate(priors_, instant);
-  const std::optional<lidar_odometry::Prior> prior = prior_for(instant, guess);
+  std::optional<lidar_odometry::Prior> prior = prior_for(instant, guess);
   if (use_prior_ && !prior) ++without_prior_;
-  const lidar_odometry::Estimate& estimate = engine_->process(*cloud, prior ? &*prior : nullptr);
+  if (use_imu_) {
+    const std::optional<lidar_odometry::Prior> inertial = inertial_.predict(waiting.stamps);
+    imu_missing_ = !inertial;
+    if (imu_missing_) ++without_imu_;
+    if (inertial) prior = prior ? combined(*inertial, *prior) : *inertial;
+  }
+  const lidar_odometry::Estimate& estimate = engine_->process(*waiting.cloud, prior ? &*prior : nullptr);
+  if (use_imu_) inertial_.correct(estimate);
   if (estimate.status != lidar_odometry::Status::bad_stamp) {
     prior_at_last_ = guess;
     last_ns_ = instant;
   }
   report(estimate);
   if (estimate.status == lidar_odometry::Status::initialising || registered(estimate.status)) {
-    if (registered(estimate.status)) publish_localizability(estimate, message.header.frame_id);
-    publish(estimate, message.header.frame_id);
+    const std::string& frame_id = waiting.message->header.frame_id;
+    if (registered(estimate.status)) publish_localizability(estimate, frame_id);
+    publish(estimate, frame_id);
   }
 }
 
@@ -320,14 +383,18 @@ void LidarOdometryComponent::publish_localizability(const lidar_odometry::Estima
 
 void LidarOdometryComponent::report(const lidar_odometry::Estimate& estimate) {
   const lidar_odometry::TotalCounters& total = estimate.total;
-  const bool fine =
-      estimate.status == lidar_odometry::Status::ok || estimate.status == lidar_odometry::Status::initialising;
+  const bool fine = !imu_missing_ && (estimate.status == lidar_odometry::Status::ok ||
+                                      estimate.status == lidar_odometry::Status::initialising);
   std::string reason = std::string(to_string(estimate.status)) + ": " + std::to_string(total.registered) + " of " +
                        std::to_string(total.clouds) + " clouds registered";
   if (total.degenerate > 0) reason += ", " + std::to_string(total.degenerate) + " degenerate";
   if (total.refused + refused_ > 0) reason += ", " + std::to_string(total.refused + refused_) + " refused";
   if (total.lost > 0) reason += ", " + std::to_string(total.lost) + " lost";
   if (without_prior_ > 1) reason += ", " + std::to_string(without_prior_ - 1) + " without their prior";
+  const lidar_odometry::InertialCounters& imu = inertial_.counters();
+  if (without_imu_ > 0) reason += ", " + std::to_string(without_imu_) + " without IMU";
+  if (imu.refused > 0) reason += ", " + std::to_string(imu.refused) + " IMU samples refused";
+  if (imu.contradicted > 0) reason += ", " + std::to_string(imu.contradicted) + " against the IMU";
   health(fine ? Health::ok : Health::warn, std::move(reason));
 }
 

@@ -13,6 +13,7 @@
 #include "components/runtime/testing/recording.hpp"
 #include "idl/point_cloud_writer.hpp"
 #include "nav_msgs/msg/odometry.hpp"
+#include "sensor_msgs/msg/imu.hpp"
 #include "sensor_msgs/msg/point_cloud2.hpp"
 
 namespace adit {
@@ -90,6 +91,7 @@ struct Outcome {
   std::vector<Odometry> poses;
   std::vector<Localizability> localizability;
   std::vector<std::byte> bytes;
+  std::string health;                                                  // at the end
   double along() const { return -poses.back().pose.pose.position.x; }  // the odometry's x looks backwards
 };
 
@@ -106,7 +108,7 @@ const std::vector<std::shared_ptr<PointCloud2>>& clouds(bool smooth) {
 
 using More = std::function<void(Recording&)>;
 
-Outcome run(bool smooth, const std::string& kind, const More& more = nullptr) {
+Outcome run(bool smooth, const std::string& kind, const More& more = nullptr, const Value::Map& extra = {}) {
   ComponentConfig config;
   config.type = config.name = "lidar_odometry";
   config.log_level = LogLevel::off;
@@ -115,6 +117,7 @@ Outcome run(bool smooth, const std::string& kind, const More& more = nullptr) {
     parameters.emplace_back("prior_kind", Value(kind));
     parameters.emplace_back("lidar_pose", Value(Value::List{1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0}));
   }
+  parameters.insert(parameters.end(), extra.begin(), extra.end());
   config.parameters = std::move(parameters);
   Outcome out;
   auto runner = OfflineRunner::build({config});
@@ -132,6 +135,7 @@ Outcome run(bool smooth, const std::string& kind, const More& more = nullptr) {
   recording.sort();
   const auto done = (*runner)->run(recording);
   EXPECT_TRUE(done) << done.error().message;
+  out.health = (*runner)->status().front().reason;
   return out;
 }
 
@@ -220,6 +224,56 @@ TEST(LidarOdometryComponent, GoesOnWhenALivePriorStops) {
   ASSERT_EQ(poses.size(), static_cast<std::size_t>(sweeps));
   const double expected = 1.02 * (drive(1.2).pose.translation().x() + 0.8 * drive(1.2).twist[0]);
   EXPECT_NEAR(-poses.back().pose.pose.position.x, expected, 0.3);
+}
+
+// What an IMU half a metre behind the LiDAR measures on that drive.
+More imu(Duration delay, Duration until = 3s, bool broken = false) {
+  return [=](Recording& recording) {
+    for (Duration t = 0ms; t < std::min<Duration>(until, 2200ms); t += 5ms) {
+      auto message = std::make_shared<sensor_msgs::msg::Imu>();
+      message->header.stamp = to_stamp(Time(begin + t));
+      message->linear_acceleration = {t < 500ms ? 0.0 : 2.0, 0.0, 9.81};
+      if (broken) message->angular_velocity.x = std::nan("");
+      recording.add("/imu", Time(begin + t + delay), message);
+    }
+  };
+}
+const Value::Map with_imu{{"use_imu", Value(true)},
+                          {"lidar_pose", Value(Value::List{1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0})},
+                          {"imu_pose", Value(Value::List{0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0})}};
+
+TEST(LidarOdometryComponent, AnImuCarriesTheAxisOfASmoothTunnel) {
+  const double truth = drive(2.0).pose.translation().x();
+  const Outcome out = run(true, "", imu(1ms), with_imu);
+  ASSERT_EQ(out.poses.size(), static_cast<std::size_t>(sweeps));
+  EXPECT_NEAR(out.along(), truth, 0.1);
+  EXPECT_EQ(out.health.find("without IMU"), std::string::npos) << out.health;
+  for (const Localizability& l : out.localizability) {
+    EXPECT_TRUE(l.degenerate);  // the IMU is not what the LiDAR sees
+    EXPECT_NE(l.translation_class[0], Localizability::LOCALIZABLE);
+  }
+  EXPECT_NEAR(run(false, "", imu(1ms), with_imu).along(), truth, 0.03);
+}
+
+TEST(LidarOdometryComponent, CloudsWaitForTheImuTheSameWhenItIsLate) {
+  const Outcome prompt = run(false, "", imu(1ms), with_imu);
+  const Outcome late = run(false, "", imu(60ms), with_imu);
+  ASSERT_EQ(late.poses.size(), prompt.poses.size());
+  EXPECT_EQ(late.bytes, prompt.bytes);
+}
+
+TEST(LidarOdometryComponent, GoesOnWithoutAnImuAndSaysSo) {
+  const Outcome without = run(false, "");
+  const Outcome silent = run(false, "", nullptr, with_imu);
+  EXPECT_EQ(silent.bytes, without.bytes);
+  EXPECT_NE(silent.health.find("20 without IMU"), std::string::npos) << silent.health;
+  const Outcome broken = run(false, "", imu(1ms, 3s, true), with_imu);
+  EXPECT_EQ(broken.bytes, without.bytes);
+  EXPECT_NE(broken.health.find("IMU samples refused"), std::string::npos) << broken.health;
+  const Outcome stops = run(false, "", imu(1ms, 1200ms), with_imu);
+  ASSERT_EQ(stops.poses.size(), static_cast<std::size_t>(sweeps));
+  EXPECT_NEAR(stops.along(), drive(2.0).pose.translation().x(), 0.05);
+  EXPECT_NE(stops.health.find("8 without IMU"), std::string::npos) << stops.health;
 }
 
 TEST(LidarOdometryComponent, RefusesAMountingThatIsNone) {

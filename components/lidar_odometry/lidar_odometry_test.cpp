@@ -287,7 +287,7 @@ TEST_P(EachMode, TellsTheInstantOfItsPoseBeforehand) {
   const Drive truth = drive(hall(), 2);
   LidarOdometry odometry(config_of(GetParam()));
   for (const RecordedSweep& sweep : truth.sweeps) {
-    const std::int64_t expected = odometry.reference_stamp_ns(sweep.cloud());
+    const std::int64_t expected = odometry.stamps(sweep.cloud()).reference_ns;
     EXPECT_EQ(odometry.process(sweep.cloud()).stamp_ns, expected);
     const double after = 1e-9 * static_cast<double>(expected - sweep.stamp_ns);
     EXPECT_NEAR(after, GetParam() == Mode::genz ? 0.05 : 0.1, 1e-6);

@@ -4,6 +4,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "components/geometry/rigid.hpp"
+
 namespace adit::lidar_odometry {
 namespace {
 
@@ -19,19 +21,13 @@ double seconds(std::int64_t from_ns, std::int64_t to_ns) {
   return ns * static_cast<double>(to_ns - from_ns);
 }
 
-bool rigid(const Pose& pose) {
-  const Eigen::Matrix3d r = pose.linear();
-  return pose.matrix().allFinite() && pose.translation().norm() < 1e7 && r.determinant() > 0.0 &&
-         (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-3;
-}
-
 }  // namespace
 
 MotionPrior::MotionPrior(const MotionPriorConfig& config)
     : config_(config), to_sensor_(se3_adjoint(config.sensor.inverse())), samples_(capacity) {}
 
 bool MotionPrior::add(const MotionSample& sample) {
-  if (!rigid(sample.pose) || !sample.twist.allFinite() || sample.twist.norm() > 1e3) return false;
+  if (!is_rigid(sample.pose) || !sample.twist.allFinite() || sample.twist.norm() > 1e3) return false;
   if (count_ > 0 && sample.stamp_ns <= at(count_ - 1).stamp_ns) return false;
   if (count_ == capacity) {
     first_ = (first_ + 1) % capacity;

@@ -22,6 +22,7 @@ struct SweepTask {
   bool external = false;                        // the prediction came from outside
   std::optional<Pose> coasting = std::nullopt;  // where the velocity of the last sweeps leads, if it is known
   bool external_twist = false;                  // the twist came from outside
+  SweepMotion sampled = {};                     // within the sweep, if it came from outside; else not moving()
 };
 
 // Fills status, pose, information, localizability and scan of the estimate; the pose in the local map's frame.

@@ -70,8 +70,9 @@ void PointOdometry::select_points() {
 }
 
 void PointOdometry::process(const SweepTask& task, Estimate& estimate) {
-  SweepMotion motion;
-  if (config_.deskew && task.times) motion = SweepMotion(task.twist, *task.times, task.reference_time);
+  SweepMotion motion = task.sampled;
+  if (config_.deskew && task.times && !motion.moving())
+    motion = SweepMotion(task.twist, *task.times, task.reference_time);
   read_points(task.cloud, motion, config_.min_range, config_.max_range, points_, estimate.scan);
   estimate.pose = task.prediction;
   if (points_.size() < config_.min_points) {

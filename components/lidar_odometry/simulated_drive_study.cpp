@@ -1,6 +1,6 @@
 // Runs the odometry over a folder of the tunnel simulator (`adit simulate`) and prints its figures; a study, no test.
 //   lidar_odometry_drive FOLDER [mode=default] [first=0] [scans=N] [every=20] [prior=PERCENT] [organised=1] [tum=FILE]
-//   [from=0: sweeps before this one are not counted in shares and largest errors]
+//   [imu=1: with the folder's IMU] [from=0: sweeps before this one are not counted in shares and largest errors]
 // prior: wheel and gyroscope with this scale error of the way. organised=0: the points as the folder has them.
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,11 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <sstream>
 #include <string>
 
 #include "components/geometry/trajectory.hpp"
+#include "components/lidar_odometry/inertial_predictor.hpp"
 #include "components/lidar_odometry/lidar_odometry.hpp"
 #include "components/lidar_odometry/test_data.hpp"
 
@@ -47,6 +49,40 @@ RecordedSweep organised(const RecordedSweep& sweep, std::size_t rows, std::size_
   return image;
 }
 
+// The folder's imu.csv: stamp [ns], specific force, rate.
+std::vector<InertialSample> read_imu(const std::string& folder) {
+  std::vector<InertialSample> samples;
+  std::ifstream file(folder + "/imu.csv");
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream fields(line);
+    InertialSample s;
+    fields >> s.stamp_ns >> s.acceleration.x() >> s.acceleration.y() >> s.acceleration.z() >> s.rate.x() >>
+        s.rate.y() >> s.rate.z();
+    samples.push_back(s);
+  }
+  return samples;
+}
+
+// A matrix of the folder's extrinsics.yaml.
+Pose read_extrinsic(const std::string& folder, const std::string& name) {
+  std::ifstream file(folder + "/extrinsics.yaml");
+  std::string line;
+  while (std::getline(file, line) && line != name + ":") {
+  }
+  Pose pose = Pose::Identity();
+  for (int row = 0; row < 3 && std::getline(file, line); ++row) {
+    for (char& c : line) {
+      if (c == '[' || c == ']' || c == ',') c = ' ';
+    }
+    line[line.find('-')] = ' ';
+    std::istringstream fields(line);
+    for (int column = 0; column < 4; ++column) fields >> pose.matrix()(row, column);
+  }
+  return pose;
+}
+
 // Mean relative error of the translation over pieces of a length, in percent.
 double piecewise(const std::vector<Pose>& truth, const std::vector<Pose>& estimate, double length) {
   std::vector<double> way{0.0};
@@ -77,6 +113,8 @@ struct Figures {
   double solves = 0.0, most_solves = 0.0, lateral = 0.0, vertical = 0.0, yaw = 0.0, tilt = 0.0, axial = 0.0;
   std::size_t from = 0;
   int flagged = 0, flagged_rotation = 0, count = 0, unregistered = 0, capped = 0;
+  Vector6d axis_nees = Vector6d::Zero(), axis_variance = Vector6d::Zero();  // sums over fully observed sweeps
+  int axis_count = 0;
 };
 
 void note(Figures& f, const Estimate& e, const Pose& truth, double ms, bool print) {
@@ -98,6 +136,11 @@ void note(Figures& f, const Estimate& e, const Pose& truth, double ms, bool prin
   f.flagged_rotation += e.localizability.rotation[0].observable ? 0 : 1;
   const int seen = 6 - e.localizability.unobservable();
   if (registered(e.status) && seen > 0) f.nees.push_back(step.dot(e.information * step) / seen);
+  if (registered(e.status) && seen == 6) {
+    f.axis_nees += step.cwiseAbs2().cwiseQuotient(e.covariance.diagonal());
+    f.axis_variance += e.covariance.diagonal();
+    ++f.axis_count;
+  }
   const Eigen::Vector3d angles = degrees * so3_log(total.linear());
   f.axial = std::max(f.axial, std::abs(total.translation().x()));
   f.lateral = std::max(f.lateral, std::abs(total.translation().y()));
@@ -132,6 +175,14 @@ void print(const Figures& f) {
   std::printf(
       "flagged %.1f %% (rotation %.1f %%)  not registered %d  NEES per observed direction mean %.2f median %.2f\n",
       100.0 * f.flagged / n, 100.0 * f.flagged_rotation / n, f.unregistered, mean_nees, quantile(f.nees, 0.5));
+  if (f.axis_count > 0) {
+    const double m = f.axis_count;
+    std::printf("by axis, x y z roll pitch yaw: NEES");
+    for (const double v : f.axis_nees) std::printf(" %.2f", v / m);
+    std::printf("; claimed sigma [mm, mdeg]");
+    for (int i = 0; i < 6; ++i) std::printf(" %.1f", 1e3 * (i < 3 ? 1.0 : degrees) * std::sqrt(f.axis_variance[i] / m));
+    std::printf("\n");
+  }
   std::printf("CPU ms median %.1f p95 %.1f max %.1f  solves mean %.1f max %.0f, at the cap %d\n", quantile(f.ms, 0.5),
               quantile(f.ms, 0.95), quantile(f.ms, 1.0), f.solves / n, f.most_solves, f.capped);
 }
@@ -181,6 +232,12 @@ int main(int argc, char** argv) {
     return 1;
   }
   LidarOdometry odometry(config);
+  const bool with_imu = number("imu", 0.0) != 0.0;
+  InertialConfig inertial;
+  inertial.lidar_from_imu = read_extrinsic(folder, "T_base_lidar").inverse() * read_extrinsic(folder, "T_base_imu");
+  InertialPredictor predictor(inertial);
+  const std::vector<InertialSample> samples = with_imu ? read_imu(folder) : std::vector<InertialSample>();
+  std::size_t next_sample = 0;
   Figures figures;
   figures.from = static_cast<std::size_t>(number("from", 0.0));
   Trajectory out;
@@ -200,12 +257,28 @@ int main(int argc, char** argv) {
       prior.information.diagonal() << 1.0 / (sigma * sigma), 1e4, 1e4, 2.5e5, 2.5e5, 2.5e5;
     }
     const std::clock_t begin = std::clock();
-    const Estimate& e = odometry.process(sweep->cloud(), std::isnan(prior_percent) || i == first ? nullptr : &prior);
+    const Prior* used = std::isnan(prior_percent) || i == first ? nullptr : &prior;
+    std::optional<Prior> predicted;
+    if (with_imu) {
+      const SweepStamps stamps = odometry.stamps(sweep->cloud());
+      while (next_sample < samples.size() && samples[next_sample].stamp_ns <= stamps.last_ns) {
+        predictor.add(samples[next_sample++]);
+      }
+      predicted = predictor.predict(stamps);
+      if (predicted) used = &*predicted;
+    }
+    const Estimate& e = odometry.process(sweep->cloud(), used);
+    if (with_imu) predictor.correct(e);
     const double ms = 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     note(figures, e, (*truth)[i].pose, ms, every > 0 && (i - first) % every == 0);
     out.push_back({e.stamp_ns, e.pose});
   }
   print(figures);
+  if (with_imu) {
+    const InertialCounters& n = predictor.counters();
+    std::printf("IMU: %lu samples, %lu refused; %lu sweeps predicted, %lu not covered, %lu contradicted\n", n.samples,
+                n.refused, n.predicted, n.uncovered, n.contradicted);
+  }
   if (options.count("tum") > 0) {
     if (const Result<void> written = write_tum(options["tum"], out); !written) return 1;
   }

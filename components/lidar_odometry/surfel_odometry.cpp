@@ -81,22 +81,44 @@ SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
   twist.predicted = task.external ? task.twist : last_twist_.value_or(task.twist);
   twist.dt = task.dt <= config_.max_gap_s ? task.dt : 0.0;
   const double share = sweeps_ == 1 ? 1.0 : config_.surfel.deskew_share;  // at first, all that is known of the motion
+  if (task.sampled.moving()) {
+    twist.sampled = &task.sampled;
+    twist.prediction = task.prediction;
+    twist.translation_share = position_known(task) ? 0.0 : share;
+    return twist;
+  }
   twist.translation_share = task.external ? 0.0 : share;
   twist.rotation_share = task.external_twist ? 0.0 : share;
   return twist;
 }
 
-void SurfelOdometry::note_twist(const Vector6d& twist) {
-  if (last_twist_) twist_change2_ += 0.2 * ((twist - *last_twist_).cwiseAbs2() - twist_change2_);
+// From outside, and better than what a velocity that is wrong by 0.3 m/s would make it.
+bool SurfelOdometry::position_known(const SweepTask& task) const {
+  constexpr double known_translation = 0.03;  // m
+  return task.external &&
+         (task.information.diagonal().head<3>().array() > 1.0 / (known_translation * known_translation)).all();
+}
+
+void SurfelOdometry::note_twist(const Vector6d& twist, bool sampled) {
+  if (last_twist_ && !sampled) twist_change2_ += 0.2 * ((twist - *last_twist_).cwiseAbs2() - twist_change2_);
   last_twist_ = twist;
 }
 
-// A sweep is compensated with one twist; what the motion changes within it displaces the pose. By how much the twist
-// usually changes from sweep to sweep tells its variance F: information I becomes (1 - I (I + F^-1)^-1) I, the inverse
-// of I^-1 + F, also of directions that the match does not know. Returns the factor.
-Matrix6d SurfelOdometry::widened(const Matrix6d& match, double duration) const {
+// What the motion within the sweep is wrong by displaces the pose. Of a sweep compensated with one twist, its usual
+// change from sweep to sweep tells the variance F; of one with the poses of an IMU, their uncertainty does. Information
+// I becomes (1 - I (I + F^-1)^-1) I, the inverse of I^-1 + F, also of directions that the match does not know. Returns
+// the factor.
+Matrix6d SurfelOdometry::widened(const Matrix6d& match, const SweepTask& task) const {
   constexpr double least_translation = 5e-4, least_rotation = 5e-5;  // m, rad
-  Vector6d variance = 0.25 * duration * duration * twist_change2_;
+  Vector6d variance = Vector6d::Zero();
+  if (task.sampled.moving()) {
+    if (position_known(task)) {
+      variance = 0.25 * task.information.ldlt().solve(Matrix6d::Identity()).diagonal().cwiseMax(0.0);
+    }
+  } else if (task.times) {
+    const double duration = task.times->last - task.times->first;
+    variance = 0.25 * duration * duration * twist_change2_;
+  }
   variance.head<3>().array() += least_translation * least_translation;
   variance.tail<3>().array() += least_rotation * least_rotation;
   Matrix6d sum = match;
@@ -162,7 +184,8 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     if (!only_guess || result.matched < needed || !translation_observable(result.directions)) {
       result = registration_.align(surfels_, map_, prior.pose, prior, twist, residual_gate, needed, pool_);
     }
-    if (sweeps_ == 1 && !task.external) result = search_start(task, prior, twist, needed, result);
+    const bool velocity_open = !task.external || (task.sampled.moving() && !position_known(task));
+    if (sweeps_ == 1 && velocity_open) result = search_start(task, prior, twist, needed, result);
     estimate.scan.matched = static_cast<std::uint32_t>(result.matched);
     estimate.scan.associations = static_cast<std::uint32_t>(result.associations);
     estimate.scan.solves = static_cast<std::uint32_t>(result.solves);
@@ -173,7 +196,7 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
       last_twist_.reset();
       return;
     }
-    note_twist(result.twist);
+    note_twist(result.twist, task.sampled.moving());
     last_median_ = result.median_residual;
     estimate.pose = result.pose;
     Matrix6d turn = Matrix6d::Zero();
@@ -181,7 +204,7 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     const Matrix6d match = turn.transpose() * DirectionalInformation::exported(result.directions) * turn;
     const Vector6d slope =
         turn.transpose() * DirectionalInformation::exported_gradient(result.directions, result.gradient);
-    const Matrix6d share = widened(match, twist.times ? twist.times->last - twist.times->first : 0.0);
+    const Matrix6d share = widened(match, task);
     estimate.information = share * match;
     estimate.information = 0.5 * (estimate.information + estimate.information.transpose().eval());
     estimate.gradient = share * slope;

@@ -23,8 +23,9 @@ class SurfelOdometry final : public Pipeline {
  private:
   SurfelPrior prior_of(const SweepTask& task) const;
   SweepTwist twist_of(const SweepTask& task) const;
-  void note_twist(const Vector6d& twist);
-  Matrix6d widened(const Matrix6d& match, double duration) const;
+  bool position_known(const SweepTask& task) const;
+  void note_twist(const Vector6d& twist, bool sampled);
+  Matrix6d widened(const Matrix6d& match, const SweepTask& task) const;
   SurfelRegistrationResult search_start(const SweepTask& task, const SurfelPrior& prior, const SweepTwist& twist,
                                         std::size_t needed, const SurfelRegistrationResult& at_rest);
 

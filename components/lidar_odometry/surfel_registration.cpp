@@ -18,6 +18,13 @@ constexpr float max_normal_angle_cosine = 0.96f;
 
 }  // namespace
 
+SweepMotion SweepTwist::motion(const Vector6d& twist) const {
+  if (!times) return {};
+  if (sampled == nullptr) return {twist, *times, reference_time};
+  const Eigen::Vector3d correction = twist.head<3>() - predicted.head<3>();
+  return correction.isZero(0.0) ? *sampled : sampled->with_velocity(correction);
+}
+
 Pose SweepTwist::middle(const Pose& pose, const Vector6d& twist) const {
   if (!times) return pose;
   return pose * se3_exp((0.5 * (times->first + times->last) - reference_time) * twist);
@@ -26,6 +33,10 @@ Pose SweepTwist::middle(const Pose& pose, const Vector6d& twist) const {
 Vector6d SweepTwist::refined(const Pose& pose, const Vector6d& used) const {
   if (!(dt > 0.0)) return used;
   Vector6d twist = predicted;
+  if (sampled != nullptr) {
+    twist.head<3>() += translation_share / dt * (prediction.inverse() * pose).translation();
+    return twist;
+  }
   const Eigen::Vector3d velocity = se3_log(last_middle.inverse() * middle(pose, used)).head<3>() / dt;
   const Eigen::Vector3d rate = so3_log(last.linear().transpose() * pose.linear()) / dt;
   twist.head<3>() += translation_share * (velocity - predicted.head<3>());
@@ -35,8 +46,7 @@ Vector6d SweepTwist::refined(const Pose& pose, const Vector6d& used) const {
 
 void SurfelRegistration::compensate(std::span<const Surfel> surfels, const SweepTwist& sweep, const Vector6d& twist,
                                     WorkerPool& pool) {
-  SweepMotion motion;
-  if (sweep.times) motion = SweepMotion(twist, *sweep.times, sweep.reference_time);
+  const SweepMotion motion = sweep.motion(twist);
   compensated_.resize(surfels.size());
   pool.run((surfels.size() + chunk_size - 1) / chunk_size, [&](std::size_t k) {
     const std::size_t end = std::min((k + 1) * chunk_size, surfels.size());

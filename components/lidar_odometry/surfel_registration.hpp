@@ -39,7 +39,13 @@ struct SweepTwist {
   Pose last_middle = Pose::Identity();  // in its middle
   Vector6d predicted = Vector6d::Zero();
   double translation_share = 0.0, rotation_share = 0.0;
+  // The motion from outside, e.g. of an IMU; `predicted` then only has its mean velocity, of which the estimate may
+  // correct the translation: by how far the pose is from where that motion led.
+  const SweepMotion* sampled = nullptr;
+  Pose prediction = Pose::Identity();
 
+  // The motion that compensates for a twist.
+  SweepMotion motion(const Vector6d& twist) const;
   // The pose in the middle of a sweep that ends at `pose` and moves with `twist`.
   Pose middle(const Pose& pose, const Vector6d& twist) const;
   // The twist to compensate with, by a pose that was found with `used`.

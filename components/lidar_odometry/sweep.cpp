@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/geometry/rigid.hpp"
+
 namespace adit::lidar_odometry {
 
 bool consistent(const Cloud& cloud) {
@@ -29,7 +31,8 @@ std::optional<TimeSpan> time_span(const Cloud& cloud) {
   return span;
 }
 
-SweepMotion::SweepMotion(const Vector6d& twist, TimeSpan span, double reference_time) {
+SweepMotion::SweepMotion(const Vector6d& twist, TimeSpan span, double reference_time)
+    : reference_time_(reference_time) {
   const double duration = span.last - span.first;
   if (!(duration > 0.0) || twist.isZero(0.0)) return;
   moving_ = true;
@@ -39,6 +42,49 @@ SweepMotion::SweepMotion(const Vector6d& twist, TimeSpan span, double reference_
     const double time = span.first + duration * i / intervals;
     poses_[static_cast<std::size_t>(i)] = se3_exp((time - reference_time) * twist).matrix().topRows<3>();
   }
+}
+
+SweepMotion::SweepMotion(std::span<const StampedPose> poses, std::int64_t stamp_ns, TimeSpan span,
+                         double reference_time)
+    : reference_time_(reference_time) {
+  const double duration = span.last - span.first;
+  if (!(duration > 0.0)) return;
+  moving_ = true;
+  first_ = span.first;
+  inverse_step_ = intervals / duration;
+  const auto seconds = [&](const StampedPose& pose) { return 1e-9 * static_cast<double>(pose.stamp_ns - stamp_ns); };
+  const auto pose_at = [&](double time) {
+    const auto after = std::upper_bound(poses.begin() + 1, poses.end() - 1, time,
+                                        [&](double t, const StampedPose& pose) { return t < seconds(pose); });
+    const StampedPose& from = *(after - 1);
+    return se3_interpolate(from.pose, after->pose, (time - seconds(from)) / (seconds(*after) - seconds(from)));
+  };
+  const Pose reference = pose_at(reference_time).inverse();
+  for (int i = 0; i <= intervals; ++i) {
+    const double time = span.first + duration * i / intervals;
+    poses_[static_cast<std::size_t>(i)] = (reference * pose_at(time)).matrix().topRows<3>();
+  }
+}
+
+SweepMotion SweepMotion::with_velocity(const Eigen::Vector3d& velocity) const {
+  SweepMotion result = *this;
+  if (!moving_) return result;
+  for (int i = 0; i <= intervals; ++i) {
+    const double time = first_ + i / inverse_step_;
+    result.poses_[static_cast<std::size_t>(i)].col(3) += (time - reference_time_) * velocity;
+  }
+  return result;
+}
+
+bool follows(std::span<const StampedPose> poses, std::int64_t stamp_ns, TimeSpan span) {
+  constexpr double slack = 1e-3;  // s
+  if (poses.size() < 2) return false;
+  const auto seconds = [&](const StampedPose& pose) { return 1e-9 * static_cast<double>(pose.stamp_ns - stamp_ns); };
+  if (seconds(poses.front()) > span.first + slack || seconds(poses.back()) < span.last - slack) return false;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (!is_rigid(poses[i].pose) || (i > 0 && poses[i].stamp_ns <= poses[i - 1].stamp_ns)) return false;
+  }
+  return true;
 }
 
 SweepMotion::Affine SweepMotion::at(double time) const {

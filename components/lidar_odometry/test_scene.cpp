@@ -79,6 +79,13 @@ Scene furnished_tunnel(double first, double last) {
 
 RecordedSweep scan(const Scene& scene, const ScannerModel& model, const Pose& end, const Vector6d& twist,
                    std::int64_t stamp_ns, unsigned seed) {
+  return scan(
+      scene, model, [&](double time) { return end * se3_exp((time / model.period - 1.0) * model.period * twist); },
+      stamp_ns, seed);
+}
+
+RecordedSweep scan(const Scene& scene, const ScannerModel& model, const std::function<Pose(double)>& pose_at,
+                   std::int64_t stamp_ns, unsigned seed) {
   const auto rows = static_cast<std::size_t>(model.rings);
   const auto columns = static_cast<std::size_t>(model.columns);
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -97,7 +104,7 @@ RecordedSweep scan(const Scene& scene, const ScannerModel& model, const Pose& en
   };
   for (std::size_t c = 0; c < columns; ++c) {
     const double fraction = static_cast<double>(c) / static_cast<double>(columns - 1);
-    const Pose pose = end * se3_exp((fraction - 1.0) * model.period * twist);
+    const Pose pose = pose_at(fraction * model.period);
     const double azimuth =
         std::numbers::pi - 2.0 * std::numbers::pi * static_cast<double>(c) / static_cast<double>(columns);
     for (std::size_t r = 0; r < rows; ++r) {

@@ -2,6 +2,7 @@
 // cylinder.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "components/geometry/se3.hpp"
@@ -41,6 +42,9 @@ struct ScannerModel {
 // A sweep that ends at `end` while moving with the constant twist [m/s; rad/s] (sensor frame). Organised, row by row;
 // rays without return are NaN. The same arguments give the same sweep.
 RecordedSweep scan(const Scene& scene, const ScannerModel& model, const Pose& end, const Vector6d& twist,
+                   std::int64_t stamp_ns, unsigned seed);
+// The same with any motion: pose_at(s after the stamp).
+RecordedSweep scan(const Scene& scene, const ScannerModel& model, const std::function<Pose(double)>& pose_at,
                    std::int64_t stamp_ns, unsigned seed);
 
 }  // namespace adit::lidar_odometry

@@ -1,0 +1,335 @@
+#include "components/lidar_odometry/inertial_predictor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "components/geometry/rigid.hpp"
+
+namespace adit::lidar_odometry {
+namespace {
+
+constexpr double ns = 1e-9;
+constexpr std::int64_t step_ns = 2'500'000;             // of the integration: half a sample at 200 Hz
+constexpr double max_rate = 100.0, max_force = 1000.0;  // rad/s, m/s^2: beyond any IMU on a vehicle
+constexpr int samples_to_believe = 10;                  // of a new time base
+constexpr std::int64_t rest_ns = 1'000'000'000;         // of samples that tell the gravity at the start
+constexpr double unknown_velocity = 10.0;               // m/s, sigma at the start
+constexpr double coarse_velocity = 0.5;                 // m/s, sigma of one that is known from poses only
+constexpr double contradiction = 100.0;                 // squared Mahalanobis distance of six dimensions: ten sigma
+constexpr int contradictions_to_believe = 5;
+constexpr std::int64_t silence_ns = 5'000'000'000;
+
+// Places of the errors in the covariance.
+constexpr int position = 0, rotation = 3, velocity = 6, gravity = 9, bias = 12;
+
+double seconds(std::int64_t from_ns, std::int64_t to_ns) {
+  return ns * static_cast<double>(to_ns - from_ns);
+}
+
+}  // namespace
+
+InertialPredictor::InertialPredictor(const InertialConfig& config) : config_(config), samples_(capacity) {
+  poses_.reserve(1024);
+}
+
+void InertialPredictor::clear() {
+  first_ = count_ = 0;
+  refused_in_a_row_ = contradictions_in_a_row_ = 0;
+  state_.reset();
+  predicted_.reset();
+  last_ns_ = silent_until_ns_ = 0;
+  last_pose_ = Pose::Identity();
+  last_twist_.reset();
+}
+
+bool InertialPredictor::add(const InertialSample& sample) {
+  ++counters_.samples;
+  const bool sane = sample.rate.allFinite() && sample.acceleration.allFinite() && sample.rate.norm() < max_rate &&
+                    sample.acceleration.norm() < max_force;
+  if (!sane) {
+    ++counters_.refused;
+    return false;
+  }
+  if (count_ > 0 && sample.stamp_ns <= newest_ns()) {
+    ++counters_.refused;
+    refused_in_a_row_ = refused_in_a_row_ > 0 && sample.stamp_ns > refused_stamp_ ? refused_in_a_row_ + 1 : 1;
+    refused_stamp_ = sample.stamp_ns;
+    if (refused_in_a_row_ < samples_to_believe) return false;
+    first_ = count_ = 0;
+  }
+  refused_in_a_row_ = 0;
+  if (count_ == capacity) {
+    first_ = (first_ + 1) % capacity;
+    --count_;
+  }
+  samples_[(first_ + count_) % capacity] = sample;
+  ++count_;
+  return true;
+}
+
+bool InertialPredictor::covers(std::int64_t from_ns, std::int64_t to_ns) const {
+  if (usable_ < 2 || seconds(from_ns, at(0).stamp_ns) > config_.max_extrapolation_s ||
+      seconds(at(usable_ - 1).stamp_ns, to_ns) > config_.max_extrapolation_s) {
+    return false;
+  }
+  for (std::size_t i = usable_ - 1; i > 0 && at(i).stamp_ns > from_ns; --i) {
+    if (at(i - 1).stamp_ns < to_ns && seconds(at(i - 1).stamp_ns, at(i).stamp_ns) > config_.max_gap_s) return false;
+  }
+  return true;
+}
+
+// Linear between two samples and for up to one period beyond the last two; then, and before the first, the nearest.
+// Precondition: usable_ >= 2.
+InertialSample InertialPredictor::reading(std::int64_t stamp_ns) const {
+  std::size_t low = 0;
+  std::size_t high = usable_ - 1;
+  if (stamp_ns <= at(low).stamp_ns) return at(low);
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    (at(middle).stamp_ns <= stamp_ns ? low : high) = middle;
+  }
+  const double share = seconds(at(low).stamp_ns, stamp_ns) / seconds(at(low).stamp_ns, at(high).stamp_ns);
+  if (share > 2.0) return at(high);
+  InertialSample result;
+  result.stamp_ns = stamp_ns;
+  result.rate = (1.0 - share) * at(low).rate + share * at(high).rate;
+  result.acceleration = (1.0 - share) * at(low).acceleration + share * at(high).acceleration;
+  return result;
+}
+
+// The midpoint rule, forwards or backwards in time.
+void InertialPredictor::advance(State& state, std::int64_t from_ns, std::int64_t to_ns, bool with_covariance) const {
+  const std::int64_t whole = to_ns - from_ns;
+  const std::int64_t steps = std::max<std::int64_t>(1, (std::abs(whole) + step_ns - 1) / step_ns);
+  const double dt = ns * static_cast<double>(whole) / static_cast<double>(steps);
+  for (std::int64_t k = 0; k < steps; ++k) {
+    const InertialSample middle = reading(from_ns + whole * (2 * k + 1) / (2 * steps));
+    const Eigen::Vector3d turn = dt * (middle.rate - state.gyro_bias);
+    const Eigen::Matrix3d half = state.rotation * so3_exp(0.5 * turn);
+    const Eigen::Vector3d acceleration = half * middle.acceleration + state.gravity;
+    if (with_covariance) {
+      using Block = Eigen::Matrix3d;
+      Covariance f = Covariance::Identity();
+      const Block pull = -dt * half * skew(middle.acceleration);
+      f.block<3, 3>(position, velocity) = dt * Block::Identity();
+      f.block<3, 3>(position, rotation) = 0.5 * dt * pull;
+      f.block<3, 3>(position, gravity) = 0.5 * dt * dt * Block::Identity();
+      f.block<3, 3>(rotation, rotation) = so3_exp(turn).transpose();
+      f.block<3, 3>(rotation, bias) = -dt * Block::Identity();
+      f.block<3, 3>(velocity, rotation) = pull;
+      f.block<3, 3>(velocity, gravity) = dt * Block::Identity();
+      const Covariance carried = f * state.covariance * f.transpose();
+      state.covariance = carried;
+      const auto grow = [&](int first, double density) {
+        state.covariance.diagonal().segment<3>(first).array() += density * density * std::abs(dt);
+      };
+      grow(rotation, config_.gyro_noise);
+      grow(velocity, config_.accel_noise);
+      grow(gravity, config_.accel_walk);
+      grow(bias, config_.gyro_walk);
+    }
+    state.position += dt * state.velocity + 0.5 * dt * dt * acceleration;
+    state.velocity += dt * acceleration;
+    state.rotation = state.rotation * so3_exp(turn);
+  }
+  state.rotation = orthonormalized(state.rotation);
+}
+
+// As if at rest: the mean of the accelerometer before that instant, turned along, is the gravity. Its spread tells how
+// wrong that is.
+InertialPredictor::State InertialPredictor::at_rest(std::int64_t stamp_ns) const {
+  State state;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  int count = 0;
+  Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();  // of the sample in the frame at that instant
+  std::int64_t now = stamp_ns;
+  while (now - step_ns >= std::max(stamp_ns - rest_ns, at(0).stamp_ns) && covers(now - step_ns, stamp_ns)) {
+    const InertialSample middle = reading(now - step_ns / 2);
+    turned = turned * so3_exp(-ns * static_cast<double>(step_ns) * middle.rate);
+    const Eigen::Vector3d force = turned * middle.acceleration;
+    mean += force;
+    squares += force.cwiseAbs2();
+    ++count;
+    now -= step_ns;
+  }
+  const double n = std::max(count, 1);
+  mean = count > 0 ? Eigen::Vector3d(mean / n) : reading(stamp_ns).acceleration;
+  const double spread = std::sqrt(std::max(0.0, (squares / n - mean.cwiseAbs2()).sum()));
+  state.gravity = -mean;
+  state.covariance.diagonal().segment<3>(velocity).setConstant(unknown_velocity * unknown_velocity);
+  state.covariance.diagonal().segment<3>(gravity).setConstant(std::pow(0.1 + 0.5 * spread, 2));
+  state.covariance.diagonal().segment<3>(bias).setConstant(config_.gyro_bias * config_.gyro_bias);
+  return state;
+}
+
+// That of poses, without samples between them.
+void InertialPredictor::set_velocity(State& state, const Vector6d& lidar_twist) const {
+  const Pose& mounting = config_.lidar_from_imu;
+  const Vector6d twist = se3_adjoint(mounting.inverse()) * lidar_twist;
+  state.velocity = twist.head<3>();
+  state.covariance.middleRows<3>(velocity).setZero();
+  state.covariance.middleCols<3>(velocity).setZero();
+  state.covariance.diagonal().segment<3>(velocity).setConstant(coarse_velocity * coarse_velocity);
+}
+
+// Moves the frame of the state to its own pose.
+void InertialPredictor::rebase(State& state) const {
+  const Eigen::Matrix3d back = state.rotation.transpose();
+  state.velocity = back * state.velocity;
+  state.gravity = back * state.gravity;
+  Covariance j = Covariance::Zero();
+  j.block<3, 3>(velocity, velocity) = j.block<3, 3>(gravity, gravity) = back;
+  j.block<3, 3>(velocity, rotation) = skew(state.velocity);
+  j.block<3, 3>(gravity, rotation) = skew(state.gravity);
+  j.block<3, 3>(bias, bias).setIdentity();
+  const Covariance turned = j * state.covariance * j.transpose();
+  state.covariance = 0.5 * (turned + turned.transpose());
+  state.position.setZero();
+  state.rotation.setIdentity();
+}
+
+void InertialPredictor::sample_sweep(const SweepStamps& sweep) {
+  poses_.clear();
+  State state = *state_;
+  std::int64_t now = std::min(sweep.first_ns, last_ns_);
+  if (now < last_ns_) advance(state, last_ns_, now, false);
+  if (now < sweep.first_ns) {
+    advance(state, last_ns_, sweep.first_ns, false);
+    now = sweep.first_ns;
+  }
+  const Pose imu_from_lidar = config_.lidar_from_imu.inverse();
+  const auto note = [&] {
+    Pose imu = Pose::Identity();
+    imu.linear() = state.rotation;
+    imu.translation() = state.position;
+    poses_.push_back({now, imu * imu_from_lidar});
+  };
+  note();
+  while (now < sweep.last_ns && poses_.size() < poses_.capacity()) {
+    const std::int64_t next = std::min(now + step_ns, sweep.last_ns);
+    advance(state, now, next, false);
+    now = next;
+    note();
+  }
+}
+
+std::optional<Prior> InertialPredictor::predict(const SweepStamps& sweep) {
+  predicted_.reset();
+  if (sweep.reference_ns < silent_until_ns_) return std::nullopt;
+  const bool first = !state_ && !last_twist_;
+  const std::int64_t from = first ? sweep.first_ns : std::min(sweep.first_ns, last_ns_);
+  const std::int64_t to = std::max(sweep.last_ns, sweep.reference_ns);
+  const bool later = first || sweep.reference_ns > last_ns_;
+  usable_ = count_;
+  while (usable_ > 0 && at(usable_ - 1).stamp_ns > to) --usable_;
+  if (!later || to - from > rest_ns || !covers(from, to)) {
+    if (count_ > 0) ++counters_.uncovered;
+    return std::nullopt;
+  }
+  if (first) last_ns_ = sweep.reference_ns;
+  if (!state_) {
+    state_ = at_rest(last_ns_);
+    if (last_twist_) set_velocity(*state_, *last_twist_);
+  }
+  sample_sweep(sweep);
+  predicted_ = *state_;
+  advance(*predicted_, last_ns_, sweep.reference_ns, true);
+  auto grow = predicted_->covariance.diagonal();
+  grow.segment<3>(position).array() += config_.least_translation * config_.least_translation;
+  grow.segment<3>(rotation).array() += config_.least_rotation * config_.least_rotation;
+  ++counters_.predicted;
+
+  Prior prior;
+  prior.sweep = poses_;
+  if (first) return prior;
+  const Pose& mounting = config_.lidar_from_imu;
+  Pose imu = Pose::Identity();
+  imu.linear() = predicted_->rotation;
+  imu.translation() = predicted_->position;
+  prior.pose = mounting * imu * mounting.inverse();
+  prior.pose.linear() = orthonormalized(prior.pose.linear());
+  // To the right perturbation of the LiDAR's motion.
+  Matrix6d to_lidar = Matrix6d::Identity();
+  to_lidar.topLeftCorner<3, 3>() = predicted_->rotation.transpose();
+  to_lidar = se3_adjoint(mounting) * to_lidar;
+  const Matrix6d covariance = to_lidar * predicted_->covariance.topLeftCorner<6, 6>() * to_lidar.transpose();
+  prior.information = covariance.ldlt().solve(Matrix6d::Identity());
+  prior.information = 0.5 * (prior.information + prior.information.transpose().eval());
+  if (!prior.information.allFinite() || !is_rigid(prior.pose)) {
+    state_.reset();
+    predicted_.reset();
+    return std::nullopt;
+  }
+  return prior;
+}
+
+// True, and the IMU is left out for a while, if what was found has been far from what was expected several times in a
+// row.
+bool InertialPredictor::contradicts(const Vector6d& found, const Matrix6d& expected) {
+  if (found.dot(expected.ldlt().solve(found)) < contradiction) {
+    contradictions_in_a_row_ = 0;
+    return false;
+  }
+  ++counters_.contradicted;
+  return ++contradictions_in_a_row_ >= contradictions_to_believe;
+}
+
+void InertialPredictor::correct(const Estimate& estimate) {
+  if (estimate.status == Status::bad_stamp || estimate.status == Status::bad_cloud) return;
+  const Pose& mounting = config_.lidar_from_imu;
+  const Pose imu = mounting.inverse() * (last_pose_.inverse() * estimate.pose) * mounting;
+  last_pose_ = estimate.pose;
+  const bool found = registered(estimate.status);
+  last_twist_.reset();
+  if (found) last_twist_ = estimate.twist;
+  if (!predicted_) {
+    last_ns_ = estimate.stamp_ns;
+    if (state_ && found) {
+      state_->rotation = imu.linear();
+      rebase(*state_);
+      set_velocity(*state_, estimate.twist);
+    } else {
+      state_.reset();
+    }
+    return;
+  }
+  state_ = *predicted_;
+  predicted_.reset();
+  last_ns_ = estimate.stamp_ns;
+  if (found) {
+    Covariance& p = state_->covariance;
+    Vector6d shift;
+    shift << imu.translation() - state_->position, so3_log(state_->rotation.transpose() * imu.linear());
+    const Matrix6d prior = p.topLeftCorner<6, 6>();
+    if (contradicts(shift, prior)) {
+      silent_until_ns_ = last_ns_ + silence_ns;
+      contradictions_in_a_row_ = 0;
+      state_.reset();
+      return;
+    }
+    // The pose's marginal goes to what the registration made of it; the other states follow. Both ends of the motion
+    // have the noise of a match.
+    Matrix6d to_imu = Matrix6d::Identity();
+    to_imu.topLeftCorner<3, 3>() = state_->rotation;
+    to_imu = to_imu * se3_adjoint(mounting.inverse());
+    const Matrix6d to_lidar = to_imu.inverse();
+    const Matrix6d match = 0.5 * to_lidar.transpose() * estimate.information * to_lidar;
+    const Eigen::LDLT<Matrix6d> prior_factors(prior);
+    const Matrix6d posterior = (prior_factors.solve(Matrix6d::Identity()) + match).ldlt().solve(Matrix6d::Identity());
+    const Eigen::Matrix<double, states, 6> gain = prior_factors.solve(p.leftCols<6>().transpose()).transpose();
+    const Eigen::Matrix<double, states, 1> step = gain * shift;
+    const Covariance updated = p - gain * (prior - posterior) * gain.transpose();
+    p = 0.5 * (updated + updated.transpose());
+    state_->position += step.segment<3>(position);
+    state_->rotation = orthonormalized(state_->rotation * so3_exp(step.segment<3>(rotation)));
+    state_->velocity += step.segment<3>(velocity);
+    state_->gravity += step.segment<3>(gravity);
+    state_->gyro_bias += step.segment<3>(bias);
+  }
+  rebase(*state_);
+}
+
+}  // namespace adit::lidar_odometry
