@@ -36,7 +36,10 @@ TEST(Allocation, ASweepCostsNoHeapCallAfterWarmUp) {
         for (std::size_t k = 0; k < sweeps.size(); ++k) {
           Cloud cloud = sweeps[k].cloud();
           cloud.stamp_ns = stamp += 100'000'000;
-          const Prior prior;
+          Prior prior;
+          const StampedPose within[2] = {{cloud.stamp_ns, Pose::Identity()},
+                                         {cloud.stamp_ns + 100'000'000, Pose::Identity()}};
+          if (k % 8 == 0) prior.sweep = within;
           odometry.process(cloud, k % 4 == 0 ? &prior : nullptr);
         }
       }

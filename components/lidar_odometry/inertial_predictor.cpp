@@ -1,9 +1,11 @@
 #include "components/lidar_odometry/inertial_predictor.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "components/geometry/rigid.hpp"
 
@@ -21,8 +23,19 @@ constexpr double contradiction = 100.0;                 // squared Mahalanobis d
 constexpr int contradictions_to_believe = 5;
 constexpr std::int64_t silence_ns = 5'000'000'000;
 
+constexpr double most_position = 0.05, most_rotation = 0.01;  // m, rad: of the pose against the local map
+
 // Places of the errors in the covariance.
 constexpr int position = 0, rotation = 3, velocity = 6, gravity = 9, bias = 12;
+
+// The scaling of three turned errors that leaves none of them a greater deviation than `most`.
+template <class Covariance>
+Eigen::Matrix3d bounding(const Covariance& covariance, int first, const Eigen::Matrix3d& turn, double most) {
+  const Eigen::Matrix3d own = turn * covariance.template block<3, 3>(first, first) * turn.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(own);
+  const Eigen::Vector3d scale = (most / eigen.eigenvalues().cwiseMax(most * most).cwiseSqrt().array()).matrix();
+  return eigen.eigenvectors() * scale.asDiagonal() * eigen.eigenvectors().transpose();
+}
 
 double seconds(std::int64_t from_ns, std::int64_t to_ns) {
   return ns * static_cast<double>(to_ns - from_ns);
@@ -80,7 +93,8 @@ bool InertialPredictor::covers(std::int64_t from_ns, std::int64_t to_ns) const {
   return true;
 }
 
-// Linear between two samples and for up to one period beyond the last two; then, and before the first, the nearest.
+// Between two samples the cubic through the four around (a gait's rates bend within a sample), or the line at the ends
+// and beside a lost sample; the line for up to one period beyond the last; then, and before the first, the nearest.
 // Precondition: usable_ >= 2.
 InertialSample InertialPredictor::reading(std::int64_t stamp_ns) const {
   std::size_t low = 0;
@@ -90,12 +104,25 @@ InertialSample InertialPredictor::reading(std::int64_t stamp_ns) const {
     const std::size_t middle = (low + high) / 2;
     (at(middle).stamp_ns <= stamp_ns ? low : high) = middle;
   }
-  const double share = seconds(at(low).stamp_ns, stamp_ns) / seconds(at(low).stamp_ns, at(high).stamp_ns);
-  if (share > 2.0) return at(high);
+  const double period = seconds(at(low).stamp_ns, at(high).stamp_ns);
+  const double t = seconds(at(low).stamp_ns, stamp_ns) / period;
+  if (t > 2.0) return at(high);
+  std::array<double, 4> weight{0.0, 1.0 - t, t, 0.0};
+  const auto beside = [&](std::size_t i) {
+    return std::abs(seconds(at(i).stamp_ns, at(i + 1).stamp_ns) - period) < 0.2 * period;
+  };
+  const bool four = low > 0 && high + 1 < usable_ && beside(low - 1) && beside(high);
+  if (four) {  // Lagrange's, of equal steps
+    weight = {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+              -(t + 1.0) * t * (t - 2.0) / 2.0, (t + 1.0) * t * (t - 1.0) / 6.0};
+  }
   InertialSample result;
   result.stamp_ns = stamp_ns;
-  result.rate = (1.0 - share) * at(low).rate + share * at(high).rate;
-  result.acceleration = (1.0 - share) * at(low).acceleration + share * at(high).acceleration;
+  for (std::size_t k = four ? 0 : 1; k < (four ? 4u : 3u); ++k) {
+    const InertialSample& sample = at(low + k - 1);
+    result.rate += weight[k] * sample.rate;
+    result.acceleration += weight[k] * sample.acceleration;
+  }
   return result;
 }
 
@@ -175,17 +202,19 @@ void InertialPredictor::set_velocity(State& state, const Vector6d& lidar_twist) 
   state.covariance.diagonal().segment<3>(velocity).setConstant(coarse_velocity * coarse_velocity);
 }
 
-// Moves the frame of the state to its own pose.
+// Moves the frame of the state to its own pose. What the pose is wrong by against the map stays with it, so that the
+// next match may correct it; along what no match corrects it stays bounded, since the map grows where the pose is.
 void InertialPredictor::rebase(State& state) const {
   const Eigen::Matrix3d back = state.rotation.transpose();
   state.velocity = back * state.velocity;
   state.gravity = back * state.gravity;
-  Covariance j = Covariance::Zero();
-  j.block<3, 3>(velocity, velocity) = j.block<3, 3>(gravity, gravity) = back;
-  j.block<3, 3>(velocity, rotation) = skew(state.velocity);
-  j.block<3, 3>(gravity, rotation) = skew(state.gravity);
-  j.block<3, 3>(bias, bias).setIdentity();
-  const Covariance turned = j * state.covariance * j.transpose();
+  Covariance turn = Covariance::Identity();
+  for (const int block : {position, velocity, gravity}) turn.block<3, 3>(block, block) = back;
+  turn.middleRows<3>(position) =
+      bounding(state.covariance, position, back, most_position) * turn.middleRows<3>(position);
+  turn.middleRows<3>(rotation) =
+      bounding(state.covariance, rotation, Eigen::Matrix3d::Identity(), most_rotation) * turn.middleRows<3>(rotation);
+  const Covariance turned = turn * state.covariance * turn.transpose();
   state.covariance = 0.5 * (turned + turned.transpose());
   state.position.setZero();
   state.rotation.setIdentity();
@@ -310,13 +339,18 @@ void InertialPredictor::correct(const Estimate& estimate) {
       state_.reset();
       return;
     }
-    // The pose's marginal goes to what the registration made of it; the other states follow. Both ends of the motion
-    // have the noise of a match.
+    // The pose's marginal goes to what the registration made of it; the other states follow.
     Matrix6d to_imu = Matrix6d::Identity();
     to_imu.topLeftCorner<3, 3>() = state_->rotation;
     to_imu = to_imu * se3_adjoint(mounting.inverse());
     const Matrix6d to_lidar = to_imu.inverse();
-    const Matrix6d match = 0.5 * to_lidar.transpose() * estimate.information * to_lidar;
+    const Matrix6d found_match = to_lidar.transpose() * estimate.information * to_lidar;
+    // A velocity that was wrong distorted the sweep: the pose is off by half of what it was wrong by in one sweep.
+    Vector6d distortion;
+    distortion << Eigen::Vector3d::Constant(0.25 * shift.head<3>().squaredNorm() + 1e-8),
+        Eigen::Vector3d::Constant(0.25 * shift.tail<3>().squaredNorm() + 1e-10);
+    const Matrix6d sum = found_match + Matrix6d(distortion.cwiseInverse().asDiagonal());
+    const Matrix6d match = found_match - found_match * sum.ldlt().solve(found_match);
     const Eigen::LDLT<Matrix6d> prior_factors(prior);
     const Matrix6d posterior = (prior_factors.solve(Matrix6d::Identity()) + match).ldlt().solve(Matrix6d::Identity());
     const Eigen::Matrix<double, states, 6> gain = prior_factors.solve(p.leftCols<6>().transpose()).transpose();

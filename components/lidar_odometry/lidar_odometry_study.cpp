@@ -185,6 +185,7 @@ int shuttle(const Config& config, int sweeps, double start) {
     const Estimate& e = odometry.process(cloud, i == 0 ? &first : nullptr);
     times.push_back(1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     largest = std::max(largest, (e.pose.translation() - Eigen::Vector3d(start + way(k), 0.0, 0.0)).norm());
+    if (i == 100 || i == 1000 || i + 1 == sweeps) std::printf("sweep %d: resident %.2f MB\n", i, resident_megabytes());
   }
   const auto median = [&](std::size_t from, std::size_t to) {
     std::vector<double> part(times.begin() + static_cast<std::ptrdiff_t>(from),
@@ -230,6 +231,8 @@ int pair(const Config& config) {
   odometry.process(target.cloud());
   const Estimate& e = odometry.process(source.cloud());
   const Vector6d d = se3_log(truth.inverse() * e.pose);
+  std::printf("error by axis %.4f %.4f %.4f m %.3f %.3f %.3f deg\n", d[0], d[1], d[2], 57.3 * d[3], 57.3 * d[4],
+              57.3 * d[5]);
   std::printf("%s error %.4f m %.3f deg n %u matched %u solves %u weak %d\n", std::string(to_string(e.status)).c_str(),
               d.head<3>().norm(), 57.3 * d.tail<3>().norm(), e.scan.registered, e.scan.matched, e.scan.solves,
               e.localizability.unobservable());

@@ -113,7 +113,8 @@ struct Figures {
   double solves = 0.0, most_solves = 0.0, lateral = 0.0, vertical = 0.0, yaw = 0.0, tilt = 0.0, axial = 0.0;
   std::size_t from = 0;
   int flagged = 0, flagged_rotation = 0, count = 0, unregistered = 0, capped = 0;
-  Vector6d axis_nees = Vector6d::Zero(), axis_variance = Vector6d::Zero();  // sums over fully observed sweeps
+  Vector6d axis_nees = Vector6d::Zero(), axis_variance = Vector6d::Zero(),
+           alone_nees = Vector6d::Zero();  // sums over fully observed sweeps
   int axis_count = 0;
 };
 
@@ -137,6 +138,10 @@ void note(Figures& f, const Estimate& e, const Pose& truth, double ms, bool prin
   const int seen = 6 - e.localizability.unobservable();
   if (registered(e.status) && seen > 0) f.nees.push_back(step.dot(e.information * step) / seen);
   if (registered(e.status) && seen == 6) {
+    // Where the match alone would be: what held it back was the prior.
+    const Vector6d alone =
+        se3_log(se3_exp(step) * se3_exp(-(e.information.ldlt().solve(Matrix6d::Identity()) * e.gradient)));
+    f.alone_nees += alone.cwiseAbs2().cwiseQuotient(e.covariance.diagonal());
     f.axis_nees += step.cwiseAbs2().cwiseQuotient(e.covariance.diagonal());
     f.axis_variance += e.covariance.diagonal();
     ++f.axis_count;
@@ -179,6 +184,8 @@ void print(const Figures& f) {
     const double m = f.axis_count;
     std::printf("by axis, x y z roll pitch yaw: NEES");
     for (const double v : f.axis_nees) std::printf(" %.2f", v / m);
+    std::printf("; of the match alone");
+    for (const double v : f.alone_nees) std::printf(" %.2f", v / m);
     std::printf("; claimed sigma [mm, mdeg]");
     for (int i = 0; i < 6; ++i) std::printf(" %.1f", 1e3 * (i < 3 ? 1.0 : degrees) * std::sqrt(f.axis_variance[i] / m));
     std::printf("\n");
@@ -248,6 +255,7 @@ int main(int argc, char** argv) {
     if (i < first) continue;
     const std::size_t rows = sweep->rings.empty() ? 1 : 128;
     if (number("organised", 1.0) != 0.0 && rows > 1) sweep = organised(*sweep, rows, 1024, 0.1);
+    if (i == first + 20 || i == first + 100) std::printf("sweep %zu: resident %.1f MB\n", i, resident_megabytes());
     Prior prior;
     if (i > first) {
       Vector6d wheel = se3_log((*truth)[i - 1].pose.inverse() * (*truth)[i].pose);
@@ -274,6 +282,7 @@ int main(int argc, char** argv) {
     out.push_back({e.stamp_ns, e.pose});
   }
   print(figures);
+  std::printf("at the end: resident %.1f MB\n", resident_megabytes());
   if (with_imu) {
     const InertialCounters& n = predictor.counters();
     std::printf("IMU: %lu samples, %lu refused; %lu sweeps predicted, %lu not covered, %lu contradicted\n", n.samples,

@@ -54,7 +54,7 @@ SurfelPrior SurfelOdometry::prior_of(const SweepTask& task) const {
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = task.prediction.linear();
   prior.information = turn * task.information * turn.transpose();
-  if (task.coasting) {
+  if (task.coasting && !task.sampled.moving()) {
     Vector6d apart;
     apart << task.coasting->translation() - task.prediction.translation(),
         so3_log(task.coasting->linear() * task.prediction.linear().transpose());
@@ -92,9 +92,9 @@ SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
   return twist;
 }
 
-// From outside, and better than what a velocity that is wrong by 0.3 m/s would make it.
+// From outside, and better than an unknown velocity would leave it.
 bool SurfelOdometry::position_known(const SweepTask& task) const {
-  constexpr double known_translation = 0.03;  // m
+  constexpr double known_translation = 0.3;  // m
   return task.external &&
          (task.information.diagonal().head<3>().array() > 1.0 / (known_translation * known_translation)).all();
 }
@@ -105,19 +105,15 @@ void SurfelOdometry::note_twist(const Vector6d& twist, bool sampled) {
 }
 
 // What the motion within the sweep is wrong by displaces the pose. Of a sweep compensated with one twist, its usual
-// change from sweep to sweep tells the variance F; of one with the poses of an IMU, their uncertainty does. Information
-// I becomes (1 - I (I + F^-1)^-1) I, the inverse of I^-1 + F, also of directions that the match does not know. Returns
-// the factor.
+// change from sweep to sweep tells the variance, of half a sweep at both ends of a motion: F. Poses of an IMU leave the
+// least. Information I becomes (1 - I (I + F^-1)^-1) I, the inverse of I^-1 + F, also of directions that the match does
+// not know. Returns the factor.
 Matrix6d SurfelOdometry::widened(const Matrix6d& match, const SweepTask& task) const {
   constexpr double least_translation = 5e-4, least_rotation = 5e-5;  // m, rad
   Vector6d variance = Vector6d::Zero();
-  if (task.sampled.moving()) {
-    if (position_known(task)) {
-      variance = 0.25 * task.information.ldlt().solve(Matrix6d::Identity()).diagonal().cwiseMax(0.0);
-    }
-  } else if (task.times) {
-    const double duration = task.times->last - task.times->first;
-    variance = 0.25 * duration * duration * twist_change2_;
+  if (task.times && !task.sampled.moving()) {
+    const double half = 0.5 * (task.times->last - task.times->first);
+    variance = 2.0 * half * half * twist_change2_;
   }
   variance.head<3>().array() += least_translation * least_translation;
   variance.tail<3>().array() += least_rotation * least_rotation;

@@ -46,6 +46,9 @@ class SweepReader {
 // Vertices of a binary little-endian PLY file of float x, y, z, scalar.
 std::vector<Point3f> read_ply(const std::string& path);
 
+// Of this process, as the kernel counts it now.
+double resident_megabytes();
+
 struct TrajectoryError {
   double ate = 0.0;          // m, root mean square after rigid alignment of the positions
   double end = 0.0;          // m, of the last position with the first poses made equal

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include "components/geometry/trajectory.hpp"
 #include "tests/integration/adit_process.hpp"
 
 namespace adit::integration {
@@ -115,6 +116,49 @@ TEST_P(Commands, RecordedTopicsPlayAgain) {
 
 INSTANTIATE_TEST_SUITE_P(Vendors, Commands, testing::Values("fastdds", "cyclonedds"),
                          [](const auto& vendor) { return std::string(vendor.param); });
+
+// A walking robot's clouds and inertial samples, as files and as a bag: the same poses, close to the truth.
+TEST(OdometryOffline, TakesTheImuOfAFolderAndOfABag) {
+  const std::string scenario = std::string(ADIT_SOURCE_DIR) + "/bringup/scenarios/s15_adit.yaml";
+  const TemporaryFolder folder;
+  for (const char* format : {"folder", "bag"}) {
+    const Output made = run_adit({"simulate", scenario, "--duration", "4", "--columns", "256", "--sensors", "lidar,imu",
+                                  "--format", format, "--out", folder.file(format)});
+    ASSERT_EQ(made.exit_code, 0) << made.text;
+  }
+  const std::string parameters = folder.write("imu.yaml", R"(
+lidar_odometry:
+  ros__parameters:
+    use_imu: true
+    lidar_pose: [0.10, 0.0, 0.85, 0.0, 0.0, 0.0, 1.0]
+    imu_pose: [0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0]
+)");
+  const Output of_folder = run_adit({"odometry", "lidar", "--input", folder.file("folder"), "--imu",
+                                     folder.file("folder/imu.csv"), "--out", folder.file("folder.tum")});
+  ASSERT_EQ(of_folder.exit_code, 0) << of_folder.text;
+  EXPECT_THAT(of_folder.text, HasSubstr("40 of 40 clouds have a pose"));
+  EXPECT_THAT(of_folder.text, testing::Not(HasSubstr("without IMU")));
+  const Output of_bag = run_adit(
+      {"odometry", "lidar", "--input", folder.file("bag"), "--config", parameters, "--out", folder.file("bag.tum")});
+  ASSERT_EQ(of_bag.exit_code, 0) << of_bag.text;
+  EXPECT_THAT(of_bag.text, testing::Not(HasSubstr("without IMU")));
+
+  const Result<Trajectory> truth = read_tum(folder.file("folder/gt_end.tum"));
+  const Result<Trajectory> files = read_tum(folder.file("folder.tum")), bag = read_tum(folder.file("bag.tum"));
+  ASSERT_TRUE(truth && files && bag);
+  ASSERT_EQ(files->size(), bag->size());
+  ASSERT_EQ(files->size(), truth->size());
+  for (std::size_t i = 0; i < files->size(); ++i) {
+    const Pose expected = truth->front().pose.inverse() * (*truth)[i].pose;
+    EXPECT_LT((files->front().pose.inverse() * (*files)[i].pose.translation() - expected.translation()).norm(), 0.03)
+        << i;
+    EXPECT_LT(((*files)[i].pose.translation() - (*bag)[i].pose.translation()).norm(), 0.005) << i;
+  }
+  const Output missing = run_adit({"odometry", "lidar", "--input", folder.file("folder"), "--imu", "/nowhere.csv",
+                                   "--out", folder.file("none.tum")});
+  EXPECT_NE(missing.exit_code, 0);
+  EXPECT_THAT(missing.text, HasSubstr("/nowhere.csv"));
+}
 
 TEST(Run, BadDeploymentsAreRefusedWithFileAndLine) {
   const TemporaryFolder folder;
