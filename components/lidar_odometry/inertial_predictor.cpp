@@ -199,7 +199,9 @@ void InertialPredictor::set_velocity(State& state, const Vector6d& lidar_twist) 
   state.velocity = twist.head<3>();
   state.covariance.middleRows<3>(velocity).setZero();
   state.covariance.middleCols<3>(velocity).setZero();
-  state.covariance.diagonal().segment<3>(velocity).setConstant(coarse_velocity * coarse_velocity);
+  // The sweeps that it is from were undistorted with another one.
+  const double sigma = std::clamp(0.5 * state.velocity.norm(), coarse_velocity, 0.5 * unknown_velocity);
+  state.covariance.diagonal().segment<3>(velocity).setConstant(sigma * sigma);
 }
 
 // Moves the frame of the state to its own pose. What the pose is wrong by against the map stays with it, so that the
@@ -263,6 +265,8 @@ std::optional<Prior> InertialPredictor::predict(const SweepStamps& sweep) {
     state_ = at_rest(last_ns_);
     if (last_twist_) set_velocity(*state_, *last_twist_);
   }
+  // The first motion is the registration's to find: how fast it starts, the IMU cannot know.
+  if (!first && state_->covariance(velocity, velocity) > 0.5 * unknown_velocity * unknown_velocity) return std::nullopt;
   sample_sweep(sweep);
   predicted_ = *state_;
   advance(*predicted_, last_ns_, sweep.reference_ns, true);

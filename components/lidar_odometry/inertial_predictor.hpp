@@ -58,7 +58,7 @@ class InertialPredictor {
   void clear();
 
   // The prior of a sweep, with the poses within it; nothing if the samples do not tell. Its span is valid until the
-  // next call. Until the velocity is known, its information about the translation is small.
+  // next call. Nothing for the second sweep either: the registration finds the first velocity.
   std::optional<Prior> predict(const SweepStamps& sweep);
   // What became of the sweep; without a prediction, too.
   void correct(const Estimate& estimate);
