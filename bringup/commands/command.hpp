@@ -19,6 +19,8 @@ void add_suite_command(CLI::App& app, ExitCode& code);
 void add_host_command(CLI::App& app, ExitCode& code);
 void add_odometry_command(CLI::App& app, ExitCode& code);
 void add_thermal_odometry_command(CLI::App& odometry, ExitCode& code);
+void add_map_command(CLI::App& app, ExitCode& code);
+void add_map_truth_command(CLI::App& app, ExitCode& code);
 void add_evaluate_command(CLI::App& app, ExitCode& code);
 void add_simulate_command(CLI::App& app, ExitCode& code);
 void add_record_command(CLI::App& app, ExitCode& code);

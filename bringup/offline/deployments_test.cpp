@@ -23,7 +23,7 @@ TEST_P(ShippedDeployment, IsFine) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedDeployment,
                          ::testing::Values("paper.yaml", "default.yaml", "robot.yaml", "experiment.yaml",
-                                           "ablation.yaml", "simulator.yaml"),
+                                           "ablation.yaml", "simulator.yaml", "mapping.yaml"),
                          [](const ::testing::TestParamInfo<const char*>& shipped) {
                            const std::string name = shipped.param;
                            return name.substr(0, name.find('.'));

@@ -68,6 +68,16 @@ struct PoseGraph::Impl {
   double chi_square(std::size_t i) const {
     return detail::residual(graph.nodes, graph.edges[i], graph.roots[i]).squaredNorm();
   }
+  // At the present nodes; returns how many loops are off.
+  std::size_t update_switches() {
+    std::size_t off = 0;
+    for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+      if (graph.edges[i].kind != EdgeKind::loop) continue;
+      graph.switches[i] = config.loop_scale / (config.loop_scale + chi_square(i));
+      off += graph.switches[i] < 0.5 ? 1 : 0;
+    }
+    return off;
+  }
 };
 
 PoseGraph::PoseGraph(const Config& config) : impl_(std::make_unique<Impl>()) {
@@ -101,24 +111,21 @@ Report PoseGraph::solve() {
   Report report;
   report.converged = true;
   if (size() < 2) return report;
-  detail::minimize(graph, impl_->config, std::nullopt, report);
-
-  std::vector<std::size_t> loops;
-  double worst = 0.0;
-  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
-    if (graph.edges[i].kind != EdgeKind::loop) continue;
-    loops.push_back(i);
-    worst = std::max(worst, impl_->chi_square(i));
-  }
-  // From a loss that is convex up to the worst loop to the one wanted, by halves (Yang et al., remark 5).
-  for (double scale = 2.0 * worst; !loops.empty() && scale > final_scale; scale *= 0.5) {
-    detail::minimize(graph, impl_->config, scale, report);
-  }
-  if (!loops.empty()) detail::minimize(graph, impl_->config, final_scale, report);
-
-  for (const std::size_t i : loops) {
-    graph.switches[i] = final_scale / (final_scale + impl_->chi_square(i));
-    if (graph.switches[i] < 0.5) ++report.loops_off;
+  // From where the nodes are: if all loops agree there, this is the solution.
+  detail::minimize(graph, impl_->config, final_scale, report);
+  report.loops_off = impl_->update_switches();
+  if (report.loops_off > 0) {
+    // From a loss that is convex up to the worst loop to the one wanted, by halves (Yang et al., remark 5).
+    detail::minimize(graph, impl_->config, std::nullopt, report);
+    double worst = 0.0;
+    for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+      if (graph.edges[i].kind == EdgeKind::loop) worst = std::max(worst, impl_->chi_square(i));
+    }
+    for (double scale = 2.0 * worst; scale > final_scale; scale *= 0.5) {
+      detail::minimize(graph, impl_->config, scale, report);
+    }
+    detail::minimize(graph, impl_->config, final_scale, report);
+    report.loops_off = impl_->update_switches();
   }
   for (std::size_t i = 0; i < size(); ++i) impl_->poses[i] = graph.nodes[i].pose();
   return report;

@@ -1,0 +1,20 @@
+// The clouds of a recorded folder as the mapping reads them.
+#pragma once
+
+#include <string>
+
+#include "components/dataset/dataset.hpp"
+#include "components/mapping/sweep_buffer.hpp"
+
+namespace adit {
+
+// Times are seconds after the sweep's start where the file has them, intensity 0 where it has none.
+Result<mapping::OwnedSweep> read_sweep(const dataset::Dataset& dataset, std::size_t index);
+
+// A folder of clouds; images are refused.
+Result<dataset::Dataset> open_clouds(const std::string& folder, double file_rate);
+
+// "x y z qx qy qz qw" as a command line has it.
+Result<Pose> pose_of(const std::vector<double>& numbers, const std::string& option);
+
+}  // namespace adit
