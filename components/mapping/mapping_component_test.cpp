@@ -150,8 +150,10 @@ TEST(MappingComponent, AMapFileOfAnotherKindIsRefused) {
   config.type = config.name = "mapping";
   config.parameters = Value::Map{{"map_file", Value(std::string("map.txt"))}};
   auto runner = OfflineRunner::build({config});
-  Recording empty;
-  EXPECT_TRUE(!runner || !(*runner)->run(empty));
+  ASSERT_TRUE(runner);
+  Recording recording;
+  recording.add("/odometry", Time(begin), odometry(Pose::Identity(), 0s));
+  EXPECT_FALSE((*runner)->run(recording));
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ TEST(Undistortion, PutsAWallBackThatWasSeenWhileDriving) {
   std::vector<float> seconds;
   for (int i = 0; i < 16; ++i) {
     const float t = 0.1F * static_cast<float>(i) / 15.0F;
-    const Pose then = *interpolate(poses, static_cast<std::int64_t>(1e9 * t));
+    const Pose then = *pose_at(poses, static_cast<std::int64_t>(1e9 * t));
     points.push_back({(then.inverse() * Eigen::Vector3d(10.0, i, 1.0)).cast<float>(), 5.0F});
     seconds.push_back(t);
   }
