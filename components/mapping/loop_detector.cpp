@@ -15,7 +15,7 @@ using pose_graph::NodeId;
 // How much of the surroundings of a keyframe a cloud is registered to: so many keyframes to each side.
 constexpr NodeId neighbours = 2;
 constexpr double coarse_voxel = 1.2, fine_voxel = 0.5;  // m, of the planes
-constexpr double coarse_kernel = 0.8, fine_kernel = 0.2;
+constexpr double coarse_kernel = 0.8, fine_kernel = 0.12;
 // A second closure confirms a first one if they differ by less than this, and this part of the way between.
 constexpr double same_m = 0.3, same_rad = 0.02, same_share = 0.02;
 constexpr double confirmation_way = 80.0;  // m: an unconfirmed closure is forgotten then

@@ -35,7 +35,7 @@ struct Config {
   double rival_share = 0.8;         // of the best score that no other possible place may reach
   double least_agreement = 0.25;    // of the correlation at the registered place
   double least_overlap = 0.7;
-  double most_rms = 0.12;            // m
+  double most_rms = 0.06;            // m: clouds that a rough odometry smeared do not fit better
   double most_axial_sigma = 0.15;    // m: weakest direction of a closure that is to make a place known
   std::size_t max_keyframes = 4000;  // then no more are taken: 16 km, about 500 MB
 };

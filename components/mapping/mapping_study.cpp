@@ -1,14 +1,12 @@
 // Mapping over a folder of the tunnel simulator (`adit simulate`) with the odometry of `adit odometry lidar`; prints
 // what was closed against the truth; a study, no test.
-//   mapping_study FOLDER ODOMETRY.tum [every=1] [drift_m=0] [drift_rad=0] [seed=1] [print=0] [map=FILE] [from=0]
-//   [scans=N]
-// every: uses each n-th sweep. drift_*: noise added to the odometry, one sigma of 1 m of way (random walk).
+//   mapping_study FOLDER ODOMETRY.tum [every=1] [scale=1] [yaw=0] [model_m] [model_rad] [print=0] [from=0] [scans=N]
+// every: uses each n-th sweep. scale, yaw [rad/m]: error added to the odometry. model_*: of the mapper's drift model.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <map>
-#include <random>
 #include <string>
 
 #include "components/dataset/dataset.hpp"
@@ -30,21 +28,19 @@ struct Options {
   }
 };
 
-// The same motion with a random walk added.
-Trajectory drifted(const Trajectory& odometry, double sigma_m, double sigma_rad, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
+// The same motion with an error of its scale and heading: smooth in the small, far off after a lap.
+Trajectory drifted(const Trajectory& odometry, double scale, double yaw_a_metre) {
   Trajectory out;
   for (std::size_t i = 0; i < odometry.size(); ++i) {
     if (i == 0) {
       out.push_back(odometry[0]);
       continue;
     }
-    const Pose step = odometry[i - 1].pose.inverse() * odometry[i].pose;
-    const double root = std::sqrt(step.translation().norm());
-    Vector6d noise;
-    for (int k = 0; k < 6; ++k) noise[k] = normal(random) * root * (k < 3 ? sigma_m : sigma_rad);
-    out.push_back({odometry[i].stamp_ns, out.back().pose * step * se3_exp(noise)});
+    Pose step = odometry[i - 1].pose.inverse() * odometry[i].pose;
+    const double way = step.translation().norm();
+    step.translation() *= scale;
+    step.linear() = step.linear() * so3_exp({0.0, 0.0, yaw_a_metre * way});
+    out.push_back({odometry[i].stamp_ns, out.back().pose * step});
   }
   return out;
 }
@@ -116,8 +112,7 @@ int main(int argc, char** argv) {
                              : truth_end.error().message.c_str());
     return 1;
   }
-  const Trajectory odometry = drifted(*recorded, options.number("drift_m", 0), options.number("drift_rad", 0),
-                                      static_cast<unsigned>(options.number("seed", 1)));
+  const Trajectory odometry = drifted(*recorded, options.number("scale", 1), options.number("yaw", 0));
   Config config;
   config.least_score = options.number("least_score", config.least_score);
   config.rival_share = options.number("rival_share", config.rival_share);

@@ -10,6 +10,7 @@
 
 #include "components/dataset/pcd_file.hpp"
 #include "components/mapping/map_file.hpp"
+#include "components/mapping/map_localizer.hpp"
 #include "components/mapping/registration.hpp"
 #include "components/mapping/section.hpp"
 #include "components/mapping/sweep_buffer.hpp"
@@ -170,6 +171,48 @@ TEST(Sections, ABareTubeHasNothingToRecognize) {
   for (const Section& s : drive(tunnel, 0.0, 160.0, 0.0)) history.add(s);
   EXPECT_FALSE(history.correlate(250, 160, false));
   EXPECT_TRUE(history.search(250, 200, 5).empty());
+}
+
+TEST(Sections, NoWindowSpansAJump) {
+  const TestTunnel tunnel;
+  SectionHistory history;
+  const std::vector<Section> sections = drive(tunnel, 0.0, 80.0, 0.0);
+  for (const Section& s : sections) history.add(s);
+  history.begin_run();
+  for (const Section& s : sections) history.add(s);
+  EXPECT_TRUE(history.correlate(100, 90, false));
+  EXPECT_FALSE(history.correlate(200, 90, false));
+  EXPECT_TRUE(history.correlate(239, 90, false));
+}
+
+TEST(MapLocalizer, ADriveIsFoundInTheMapItsOdometryDriftsFrom) {
+  const TestTunnel tunnel;
+  VoxelGrid map(0.2);
+  for (double s = 0.0; s < 60.0; s += 3.0) {
+    map.insert(tunnel.seen_from(Pose::Identity(), s, 6'000, static_cast<std::uint32_t>(s) + 1));
+  }
+  const Points points = map.points();
+  MapLocalizer localizer(points, tunnel.at(10.0) * moved(0.4, -0.3, 0.1, 0.03));
+  Trajectory odometry;
+  std::vector<Pose> truth;
+  for (int i = 0; i < 25; ++i) {
+    truth.push_back(tunnel.at(10.0 + i) * moved(0.0, 0.3 * std::sin(0.3 * i), 0.0, 0.0));
+    Pose step = Pose::Identity();  // 2 % too long
+    if (i > 0) step = truth[truth.size() - 2].inverse() * truth.back();
+    step.translation() *= 1.02;
+    odometry.push_back({i * 100'000'000, i == 0 ? Pose::Identity() : Pose(odometry.back().pose * step)});
+    const Points sweep = tunnel.seen_from(truth.back(), 10.0 + i, 8'000, 500 + static_cast<std::uint32_t>(i));
+    EXPECT_TRUE(localizer.add({i * 100'000'000, sweep, {}}, odometry));
+    EXPECT_FALSE(localizer.add({i * 100'000'000, sweep, {}}, odometry));
+  }
+  const MapLocalizer::Result result = localizer.smoothed();
+  ASSERT_EQ(result.poses.size(), truth.size());
+  EXPECT_GE(result.registered, 23u);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const Pose error = truth[i].inverse() * result.poses[i].pose;
+    EXPECT_LT(error.translation().norm(), 0.06) << i;
+    EXPECT_LT(so3_log(error.linear()).norm(), 0.002) << i;
+  }
 }
 
 TEST(SweepBuffer, ASweepWaitsForItsEnd) {

@@ -90,6 +90,7 @@ Eigen::Vector2d offset_between(std::span<const Section> of, std::span<const Sect
 
 void SectionHistory::add(const Section& section) {
   raw_.push_back(section);
+  run_of_.push_back(static_cast<std::uint32_t>(run_begin_));
   if (raw_.size() <= config_.smoothing) return;
   features_.push_back(feature(features_.size()));
   double squares = 0.0;
@@ -126,7 +127,7 @@ double SectionHistory::energy(std::size_t first) const {
 }
 
 bool SectionHistory::holds_window(std::size_t end) const {
-  return end < features_.size() && end + 1 >= config_.window;
+  return end < features_.size() && end + 1 >= run_of_[end] + config_.window;
 }
 
 bool SectionHistory::has_contrast(double energy) const {

@@ -50,6 +50,8 @@ class SectionHistory {
   explicit SectionHistory(const Config& config) : config_(config) {}
 
   void add(const Section& section);
+  // The next section does not follow on the last one (the odometry jumped): no window spans the two.
+  void begin_run() { run_begin_ = raw_.size(); }
   std::size_t size() const { return raw_.size(); }
   // Sections before this one are final: a window may end there.
   std::size_t ready() const { return features_.size(); }
@@ -77,6 +79,8 @@ class SectionHistory {
 
   Config config_;
   std::vector<Section> raw_;
+  std::size_t run_begin_ = 0;
+  std::vector<std::uint32_t> run_of_;  // first section of the run of each section
   std::vector<Feature> features_;
   std::vector<double> energy_{0.0};  // sums of squares up to a section
 };
