@@ -196,14 +196,15 @@ TEST(MapLocalizer, ADriveIsFoundInTheMapItsOdometryDriftsFrom) {
   Trajectory odometry;
   std::vector<Pose> truth;
   for (int i = 0; i < 25; ++i) {
+    const std::int64_t stamp = i * std::int64_t{100'000'000};
     truth.push_back(tunnel.at(10.0 + i) * moved(0.0, 0.3 * std::sin(0.3 * i), 0.0, 0.0));
     Pose step = Pose::Identity();  // 2 % too long
     if (i > 0) step = truth[truth.size() - 2].inverse() * truth.back();
     step.translation() *= 1.02;
-    odometry.push_back({i * 100'000'000, i == 0 ? Pose::Identity() : Pose(odometry.back().pose * step)});
+    odometry.push_back({stamp, i == 0 ? Pose::Identity() : Pose(odometry.back().pose * step)});
     const Points sweep = tunnel.seen_from(truth.back(), 10.0 + i, 8'000, 500 + static_cast<std::uint32_t>(i));
-    EXPECT_TRUE(localizer.add({i * 100'000'000, sweep, {}}, odometry));
-    EXPECT_FALSE(localizer.add({i * 100'000'000, sweep, {}}, odometry));
+    EXPECT_TRUE(localizer.add({stamp, sweep, {}}, odometry));
+    EXPECT_FALSE(localizer.add({stamp, sweep, {}}, odometry));
   }
   const MapLocalizer::Result result = localizer.smoothed();
   ASSERT_EQ(result.poses.size(), truth.size());

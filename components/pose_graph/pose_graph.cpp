@@ -121,7 +121,8 @@ Report PoseGraph::solve() {
     for (std::size_t i = 0; i < graph.edges.size(); ++i) {
       if (graph.edges[i].kind == EdgeKind::loop) worst = std::max(worst, impl_->chi_square(i));
     }
-    for (double scale = 2.0 * worst; scale > final_scale; scale *= 0.5) {
+    constexpr double most = 1e12;  // a bound on the number of stages
+    for (double scale = 2.0 * std::min(worst, most); scale > final_scale; scale *= 0.5) {
       detail::minimize(graph, impl_->config, scale, report);
     }
     detail::minimize(graph, impl_->config, final_scale, report);

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 // middleware.
 const std::set<std::string> plain_libraries = {"geometry", "config", "dataset", "pose_graph"};
 // Components whose algorithm is a library of its own: only the adapter (a file named *component*) knows the framework.
-const std::set<std::string> algorithm_folders = {"lidar_odometry", "thermal_odometry", "state_estimator",
+const std::set<std::string> algorithm_folders = {"lidar_odometry", "mapping", "thermal_odometry", "state_estimator",
                                                  "tunnel_simulator"};
 
 bool starts_with_any(const std::string& text, std::initializer_list<const char*> prefixes) {
