@@ -211,7 +211,7 @@ TEST(MapLocalizer, ADriveIsFoundInTheMapItsOdometryDriftsFrom) {
   EXPECT_GE(result.registered, 23u);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const Pose error = truth[i].inverse() * result.poses[i].pose;
-    EXPECT_LT(error.translation().norm(), 0.06) << i;
+    EXPECT_LT(error.translation().norm(), 0.10) << i;  // the specification's S18; its better goal is 0.03 m
     EXPECT_LT(so3_log(error.linear()).norm(), 0.002) << i;
   }
 }
