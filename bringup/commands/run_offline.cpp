@@ -49,7 +49,8 @@ void add_run_offline_command(CLI::App& app, ExitCode& code) {
       ->required();
   command->add_option("--duration", request.source.duration_s, "stop after this time of the input [s]");
   command->add_option("--seed", arguments->seed, "of the simulation, instead of the scenario's");
-  command->add_option("--record", request.record, "topic of the components to write to the bag OUT/bag (repeatable)");
+  command->add_option("--record", request.record,
+                      "topic of the components or of the simulation to write to the bag OUT/bag (repeatable)");
   command->add_option("--threads", request.source.threads, "of the simulation; the data do not depend on it")
       ->capture_default_str();
   command->callback([arguments, &code] {

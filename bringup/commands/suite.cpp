@@ -8,6 +8,7 @@
 #include "bringup/commands/file_commands.hpp"
 #include "bringup/evaluation/study.hpp"
 #include "bringup/offline/run.hpp"
+#include "bringup/offline/scenario_description.hpp"
 
 namespace adit {
 namespace {
@@ -19,8 +20,10 @@ struct Arguments {
   std::string folder = "bringup/scenarios";
   std::string scenarios = "all";  // beginnings of file names, separated by commas
   std::vector<std::string> variables;
-  std::string out;
-  int seeds = 5;
+  fs::path out;
+  std::vector<std::string> record;
+  fs::path recorded;
+  int first_seed = 1, seeds = 5;
   double duration_s = 0.0;
   int threads = 2;
 };
@@ -44,11 +47,11 @@ Result<std::vector<std::string>> find_scenarios(const Arguments& arguments) {
   return found;
 }
 
-Result<void> write(const std::string& path, const std::string& text) {
+Result<void> write(const fs::path& path, const std::string& text) {
   std::ofstream file(path);
   file << text;
   file.flush();
-  if (!file) return Error{ErrorCode::io, path + ": cannot write"};
+  if (!file) return Error{ErrorCode::io, path.string() + ": cannot write"};
   return {};
 }
 
@@ -64,8 +67,11 @@ Result<void> run_one(const Arguments& arguments, const std::string& scenario, st
       return Error{ErrorCode::invalid_argument, "--set '" + variable + "': give NAME=VALUE"};
     request.overrides.variables[variable.substr(0, equals)] = variable.substr(equals + 1);
   }
-  request.input = scenario;
-  request.out = (fs::path(arguments.out) / name / std::to_string(seed)).string();
+  const fs::path place = fs::path(name) / std::to_string(seed);
+  request.input = arguments.recorded.empty() ? scenario : (arguments.recorded / place / "bag").string();
+  request.overrides.variables.emplace("VEHICLE", offline::vehicle_of(scenario));
+  request.out = (arguments.out / place).string();
+  request.record = arguments.record;
   request.source.duration_s = arguments.duration_s;
   request.source.seed = seed;
   request.source.threads = arguments.threads;
@@ -91,16 +97,17 @@ Result<void> run(const Arguments& arguments) {
   if (!scenarios) return scenarios.error();
   std::error_code bad;
   fs::create_directories(arguments.out, bad);
-  if (bad) return Error{ErrorCode::io, arguments.out + ": cannot create the folder: " + bad.message()};
+  if (bad) return Error{ErrorCode::io, arguments.out.string() + ": cannot create the folder: " + bad.message()};
   std::vector<evaluation::StudyRow> rows;
   int failed = 0;
-  for (const std::string& scenario : *scenarios) {
-    for (int seed = 1; seed <= arguments.seeds; ++seed) {
+  // Seed by seed: what is there when somebody stops it has as many runs of each scenario as can be.
+  for (int seed = arguments.first_seed; seed < arguments.first_seed + arguments.seeds; ++seed) {
+    for (const std::string& scenario : *scenarios) {
       if (Result<void> done = run_one(arguments, scenario, static_cast<std::uint64_t>(seed), rows); !done) {
         std::fprintf(stderr, "adit: %s seed %d: %s\n", scenario.c_str(), seed, done.error().message.c_str());
         ++failed;
       }
-      if (Result<void> written = write(arguments.out + "/suite.json", evaluation::study_json(rows)); !written) {
+      if (Result<void> written = write(arguments.out / "suite.json", evaluation::study_json(rows)); !written) {
         return written;
       }
     }
@@ -108,7 +115,7 @@ Result<void> run(const Arguments& arguments) {
   if (!rows.empty()) {
     const std::string table = evaluation::print_study(rows);
     std::fputs(table.c_str(), stdout);
-    if (Result<void> written = write(arguments.out + "/suite.txt", table); !written) return written;
+    if (Result<void> written = write(arguments.out / "suite.txt", table); !written) return written;
   }
   if (failed > 0) return Error{ErrorCode::internal, std::to_string(failed) + " runs failed; see above"};
   return {};
@@ -127,9 +134,16 @@ void add_suite_command(CLI::App& app, ExitCode& code) {
   command->add_option("--folder", arguments->folder, "of the scenario files")
       ->check(CLI::ExistingDirectory)
       ->capture_default_str();
-  command->add_option("--seeds", arguments->seeds, "runs of each scenario, seeds 1 to N")
+  command->add_option("--seeds", arguments->seeds, "runs of each scenario, each with its own seed")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command->add_option("--first-seed", arguments->first_seed, "the others follow")->capture_default_str();
+  command->add_option("--record", arguments->record,
+                      "topic of the components or of the simulation to write to OUT/SCENARIO/SEED/bag (repeatable)");
+  command
+      ->add_option("--recorded", arguments->recorded,
+                   "OUT of a suite run with --record: its bags take the place of the simulation")
+      ->check(CLI::ExistingDirectory);
   command->add_option("--duration", arguments->duration_s, "stop each after this time [s]; 0: whole");
   command->add_option("--threads", arguments->threads, "of the simulation")->capture_default_str();
   command->add_option("--set", arguments->variables, "NAME=VALUE for ${NAME} in the file (repeatable)");

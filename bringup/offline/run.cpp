@@ -1,6 +1,5 @@
 #include "bringup/offline/run.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -8,9 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bringup/offline/progress.hpp"
+#include "bringup/offline/recorder.hpp"
 #include "bringup/offline/scenario_description.hpp"
-#include "components/dataset/bag_qos.hpp"
-#include "components/dataset/bag_writer.hpp"
 
 namespace adit::offline {
 namespace {
@@ -24,15 +22,16 @@ bool is_scenario(const std::string& input) {
   return std::filesystem::path(input).extension() == ".yaml";
 }
 
-// Passes messages on and watches the time go by.
+// Passes messages on, watches the time go by, and lets the recorder see them.
 class Watched final : public OfflineSource {
  public:
-  Watched(Source& source, std::string label)
-      : source_(source), progress_(std::move(label), source.begin(), source.end()) {}
+  Watched(Source& source, std::string label, Recorder& recorder)
+      : source_(source), progress_(std::move(label), source.begin(), source.end()), recorder_(recorder) {}
   Result<bool> next(OfflineMessage& out) override {
     Result<bool> more = source_.next(out);
     if (more && *more) {
       progress_.at(out.stamp);
+      recorder_.note(out);
     } else {
       progress_.done();
     }
@@ -42,39 +41,7 @@ class Watched final : public OfflineSource {
  private:
   Source& source_;
   Progress progress_;
-};
-
-// What the components publish on some topics, as a bag: odometries of front ends for studies of the filter alone.
-class Recorder {
- public:
-  Result<void> open(const std::string& folder, OfflineRunner& runner, const std::vector<std::string>& topics) {
-    auto writer = dataset::BagWriter::create(folder);
-    if (!writer) return writer.error();
-    writer_ = *std::move(writer);
-    for (const PortInfo& port : runner.ports()) {
-      const bool wanted = port.direction == PortInfo::Direction::output &&
-                          std::find(topics.begin(), topics.end(), port.topic) != topics.end();
-      if (!wanted) continue;
-      dataset::BagTopic topic;
-      topic.name = port.topic;
-      topic.type = port.type->ros_name;
-      topic.qos = dataset::bag_qos_text({dataset::BagQos{}});
-      topic.type_hash = port.type->type_hash;
-      topic.schema = port.type->schema;
-      const Result<std::size_t> index = writer_->add_topic(topic);
-      if (!index) return index.error();
-      runner.tap_cdr(port.topic, [this, index = *index](Bytes cdr, Time stamp) {
-        if (!failed_) return;
-        failed_ = writer_->write({index, stamp.time_since_epoch().count(), cdr});
-      });
-    }
-    return {};
-  }
-  Result<void> close() { return !writer_ || !failed_ ? failed_ : writer_->close(); }
-
- private:
-  std::unique_ptr<dataset::BagWriter> writer_;
-  Result<void> failed_;
+  Recorder& recorder_;
 };
 
 Result<void> write_run(const RunOutcome& outcome) {
@@ -118,6 +85,7 @@ Result<RunOutcome> run(const RunRequest& request) {
   for (const PortInfo& port : (*runner)->ports()) {
     if (port.direction == PortInfo::Direction::input) options.topics.insert(port.topic);
   }
+  options.topics.insert(request.record.begin(), request.record.end());
   const Result<std::unique_ptr<Source>> source = open_source(request.input, options);
   if (!source) return source.error();
 
@@ -130,7 +98,7 @@ Result<RunOutcome> run(const RunRequest& request) {
 
   RunOutcome outcome;
   const auto start = std::chrono::steady_clock::now();
-  Watched watched(**source, std::filesystem::path(request.input).stem().string());
+  Watched watched(**source, std::filesystem::path(request.input).stem().string(), recorder);
   const Result<OfflineStats> stats = (*runner)->run(watched);
   if (!stats) return stats.error();
   if (Result<void> closed = recorder.close(); !closed) return closed.error();

@@ -20,7 +20,7 @@ struct RunRequest {
   std::string input;                // scenario file, bag or folder: instead of the deployment's sources
   std::string out;                  // folder, made when it is not there
   SourceOptions source;             // its topics are found by the run
-  std::vector<std::string> record;  // topics that the components publish, for the bag OUT/bag
+  std::vector<std::string> record;  // topics of the components and of a simulated input, for the bag OUT/bag
 };
 
 struct RunOutcome {
