@@ -24,7 +24,8 @@ double weight_of(const SensorReport& report, const GateConfig& gate, double limi
   if (limit <= 0.0) return 1.0;
   if (report.nis > limit) return 0.0;
   const double certain = chi_square(report.nis_dof, Quantile::p95);
-  return gate.robust && report.nis > certain ? std::sqrt(certain / report.nis) : 1.0;
+  const double robust = gate.robust && report.nis > certain ? std::sqrt(certain / report.nis) : 1.0;
+  return robust / std::max(1.0, report.noise_factor);
 }
 
 void fill(const SensorReport& report, const Arrival& arrival, const Config& config, std::int64_t now,

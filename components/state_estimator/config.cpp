@@ -45,6 +45,7 @@ Config Config::paper() {
   c.process.max_speed = c.process.max_accel = c.process.max_yaw_rate = c.process.max_yaw_accel = 0.0;
   c.gate.enabled = false;
   c.disagreement.enabled = false;
+  c.adaptation.enabled = false;
   c.zero_velocity.enabled = false;
   c.odometries = {lidar(), thermal()};
   for (OdometrySensor& s : c.odometries) {

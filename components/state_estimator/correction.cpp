@@ -33,6 +33,12 @@ double distance(const FilterState& state, const Innovation& innovation) {
 }
 
 template <int Rows>
+double share(const FilterState& state, const Innovation& innovation) {
+  const Terms<Rows> t(state, innovation);
+  return t.cholesky.info() == Eigen::Success ? t.cholesky.solve(t.r).trace() / Rows : 0.0;
+}
+
+template <int Rows>
 bool correct_rows(FilterState& state, const Innovation& innovation) {
   const Terms<Rows> t(state, innovation);
   if (t.cholesky.info() != Eigen::Success) return false;
@@ -81,6 +87,19 @@ double squared_distance(const FilterState& state, const Innovation& innovation) 
       return distance<3>(state, innovation);
     default:
       return -1.0;
+  }
+}
+
+double noise_share(const FilterState& state, const Innovation& innovation) {
+  switch (innovation.rows) {
+    case 1:
+      return share<1>(state, innovation);
+    case 2:
+      return share<2>(state, innovation);
+    case 3:
+      return share<3>(state, innovation);
+    default:
+      return 0.0;
   }
 }
 

@@ -26,6 +26,10 @@ Innovation project(const Linearization& linearization, const Measurement& measur
 // Squared Mahalanobis distance nu' S^-1 nu (NIS). Negative when S is not positive definite.
 double squared_distance(const FilterState& state, const Innovation& innovation);
 
+// Share of the measurement's noise R in the innovation's covariance S: trace(S^-1 R) / rows, 0 to 1; 0 when S is not
+// positive definite.
+double noise_share(const FilterState& state, const Innovation& innovation);
+
 // x += K nu, P = (I - K H) P (I - K H)' + K R K' (Joseph), angles wrapped, P symmetric. Returns false and changes
 // nothing when the innovation's covariance is not positive definite or the result would not be finite.
 bool correct(FilterState& state, const Innovation& innovation);

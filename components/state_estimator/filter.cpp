@@ -51,7 +51,12 @@ bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel
                      Innovation& innovation) const {
   SensorState& statistics = state.sensors[m.sensor];
   innovation = project(sensor.model->linearize(state, m), m);
+  if (sensor.moves && m.rows > 0) {
+    observe_surprise(statistics.window, std::max(0.0, squared_distance(state, innovation)) / m.rows);
+  }
   if (sensor.moves) innovation.covariance *= conflict_inflation(state, m.sensor, disagreement);
+  const bool adapts = adaptation.enabled && sensor.adapts;
+  if (adapts) innovation.covariance *= statistics.noise.factor;
   const double nis = squared_distance(state, innovation);
   statistics.nis = nis;
   statistics.nis_dof = m.rows;
@@ -65,6 +70,9 @@ bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel
   if (disagreement.enabled && (statistics.is_distrusted || (m.motion.frozen && moving))) {
     ++statistics.distrusted;
     return false;
+  }
+  if (adapts && !state.conflict) {
+    statistics.noise.add(nis, m.rows, noise_share(state, innovation), adaptation);
   }
   if (!gate.enabled || !sensor.gated) return true;
   const double certain = chi_square(m.rows, Quantile::p95);

@@ -34,6 +34,7 @@ struct SensorModel {
   bool moves = false;     // reports motion: its silence is an outage, the disagreement test watches it
   bool scaled = false;    // its lengths carry kScale
   bool gated = true;
+  bool adapts = false;      // its covariance is scaled by what its innovations show
   bool standstill = false;  // the zero-velocity detector
 };
 
@@ -42,6 +43,7 @@ class Filter {
   ProcessConfig process;
   GateConfig gate;
   DisagreementConfig disagreement;
+  NoiseAdaptationConfig adaptation;
 
   // Index of the new sensor, or -1 when there are kMaxSensors already.
   int add_sensor(SensorModel sensor);

@@ -38,7 +38,9 @@ double doubt(const SensorState& i, const SensorState& j, bool standing, const Di
   // A sensor that sees nothing move is the usual way to be wrong, unless the IMU says so too.
   if (speeds && i_stands && j_moves && !standing) value += 0.5;
   if (speeds && standing && std::abs(i.window.speed) > 4.0 * config.zero_speed) value += 0.8;
-  if (i.consecutive_rejections >= 2) value += 0.4;
+  // The one that departs from the motion that both had measured before is the less likely.
+  const bool surprises = 1.0 + i.window.surprise > config.surprise_ratio * (1.0 + j.window.surprise);
+  if (surprises || i.consecutive_rejections >= 2) value += 0.4;
   return value;
 }
 
@@ -81,6 +83,11 @@ void observe_motion(FilterState& state, int sensor, std::int64_t stamp_ns, const
   } else if (w.zero_since_ns == kNoStamp) {
     w.zero_since_ns = stamp_ns;
   }
+}
+
+void observe_surprise(MotionWindow& window, double nis_per_dof) {
+  constexpr double gain = 0.3, most = 100.0;
+  window.surprise += gain * (std::min(nis_per_dof, most) - window.surprise);
 }
 
 bool disagree(const MotionWindow& a, const MotionWindow& b, const DisagreementConfig& config) {

@@ -22,12 +22,16 @@ struct DisagreementConfig {
   double speed_fraction = 0.05;   // of the speed, for scale errors not yet estimated
   double yaw_rate_floor = 0.03;   // rad/s
   double evidence_margin = 0.25;  // difference of the doubts that decides a conflict
+  double surprise_ratio = 4.0;    // a sensor so much less expected than the one it contradicts is in doubt
   double zero_speed = 0.05;       // m/s, below: the sensor reports no motion
 };
 
 // Adds a report to a sensor's window. `speed_scale`: what to divide its speed by (the estimated thermal scale).
 void observe_motion(FilterState& state, int sensor, std::int64_t stamp_ns, const Motion& motion, double speed_scale,
                     const DisagreementConfig& config);
+
+// Adds the NIS of an examined measurement, with the covariance as reported: who departs from the motion so far?
+void observe_surprise(MotionWindow& window, double nis_per_dof);
 
 // Compares all fresh windows and updates conflict and distrust. `standing`: an IMU says the body stands still.
 void judge(FilterState& state, std::int64_t stamp_ns, bool standing, const DisagreementConfig& config);

@@ -190,5 +190,21 @@ TEST(Health, AStillImuMakesTheMovingSensorTheSuspect) {
   EXPECT_FALSE(s.sensors[1].is_distrusted);
 }
 
+// Neither front end doubts itself: the one that departs from the motion both had seen before is not believed, be it the
+// more precise one or the other.
+TEST_F(TwoSensors, TheOneThatDepartsFromTheMotionSoFarIsDistrusted) {
+  run(3.0, kFive, kFive);
+  run(1.5, kFive, [](double) { return 9.0; });
+  EXPECT_TRUE(state_.sensors[1].is_distrusted);
+  EXPECT_FALSE(state_.sensors[0].is_distrusted);
+  EXPECT_NEAR(state_.x(kSpeed), 5.0, 0.3);
+  run(5.0, kFive, kFive);
+  EXPECT_FALSE(state_.sensors[1].is_distrusted);
+  run(
+      1.5, [](double) { return 9.0; }, kFive);
+  EXPECT_TRUE(state_.sensors[0].is_distrusted);
+  EXPECT_NEAR(state_.x(kSpeed), 5.0, 0.5);
+}
+
 }  // namespace
 }  // namespace adit::state_estimator

@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include "components/state_estimator/noise_adaptation.hpp"
+
 namespace adit::state_estimator {
 
 // State vector. Position and heading in `odom`, motion of base_link; arXiv 2505.03565 eq. for x = [x y v v' psi psi'
@@ -48,6 +50,7 @@ struct MotionWindow {
   double speed = 0.0, speed_variance = 0.0;
   double yaw_rate = 0.0, yaw_rate_variance = 0.0;
   double suspicion = 0.0;  // the front end's own doubt, 0 none to 1 certain
+  double surprise = 0.0;   // NIS per degree of freedom with the covariance as reported, recent mean: 1 is usual
   std::int64_t stamp_ns = kNoStamp;
   std::int64_t speed_stamp_ns = kNoStamp;  // last report with information along the heading
   std::int64_t zero_since_ns = kNoStamp;   // since when the sensor reports no motion at all
@@ -68,6 +71,7 @@ struct SensorState {
   double nis_per_dof_sum = 0.0;  // over all examined ones: the mean should be 1
   std::uint64_t examined = 0;
   bool is_distrusted = false;
+  NoiseAdaptation noise;
   MotionWindow window;
 };
 

@@ -12,11 +12,6 @@ double square(double value) {
   return value * value;
 }
 
-// The rotation without its heading: body axes to levelled axes.
-Eigen::Matrix3d level_of(const Eigen::Matrix3d& rotation) {
-  return so3_exp({0.0, 0.0, -yaw(rotation)}) * rotation;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<StateEstimator>> StateEstimator::create(const Config& config) {
@@ -34,11 +29,13 @@ StateEstimator::StateEstimator(const Config& config)
   filter_.process = config.process;
   filter_.gate = config.gate;
   filter_.disagreement = config.disagreement;
+  filter_.adaptation = config.adaptation;
   int slot = 0;
   for (const OdometrySensor& o : config.odometries) {
     SensorModel model;
     model.moves = true;
     model.scaled = o.odometry.calibration.scale;
+    model.adapts = !o.odometry.fixed_noise;
     if (o.odometry.relative_pose) {
       model.clone_slot = slot;
       model.reanchor = o.odometry.anchor_period_s <= 0.0;
@@ -46,7 +43,7 @@ StateEstimator::StateEstimator(const Config& config)
     } else {
       model.model = std::make_unique<SpeedAndYawRate>(o.odometry.calibration);
     }
-    odometries_.push_back({o, std::nullopt, std::nullopt});
+    odometries_.emplace_back(o, static_cast<std::uint8_t>(odometries_.size()));
     add_sensor(o.name, std::move(model));
   }
   if (config.imu.enabled) {
@@ -95,7 +92,7 @@ void StateEstimator::restart_at(std::int64_t stamp_ns, std::int64_t pose_of_ns) 
   const std::int64_t silence_ns = static_cast<std::int64_t>(config_.longest_silence_s * 1e9);
   predict(old, pose_of_ns - old.stamp_ns > silence_ns ? old.stamp_ns + silence_ns : pose_of_ns, filter_.process);
   replay_.restart(without_motion(old, config_, stamp_ns));
-  for (Odometry& o : odometries_) o.anchor = o.previous = std::nullopt;
+  for (OdometryTrack& track : odometries_) track.restart();
   tilt_ = Tilt(config_.imu.tilt);
   standstill_ = StandstillDetector(config_.imu.standstill);
   published_ns_ = zero_velocity_ns_ = height_ns_ = closure_ns_ = kNoStamp;
@@ -144,7 +141,9 @@ Verdict StateEstimator::insert(const Measurement& m, std::int64_t now_ns) {
   const SensorModel& model = filter_.sensor(m.sensor);
   const bool relative = model.clone_slot >= 0;
   const std::int64_t earliest = relative ? m.anchor_ns : m.stamp_ns;
-  if (!started_) start(earliest - 200'000'000);
+  // Whatever time it waited: where the body is when its motion is measured for the first time is where odom begins.
+  if (!measured_) start(earliest);
+  measured_ = true;
   if (seconds_between(replay_.head().stamp_ns, earliest) > config_.longest_silence_s) {
     restart_at(earliest, earliest);
     ++forgotten_motions_;
@@ -184,7 +183,7 @@ Verdict StateEstimator::add_measurement(const Measurement& m, std::int64_t now_n
 Verdict StateEstimator::add_motion(int sensor, const RelativeMotion& motion, std::int64_t now_ns) {
   if (sensor < 0 || sensor >= static_cast<int>(odometries_.size())) return Verdict::unknown_sensor;
   Measurement m;
-  switch (to_measurement(motion, odometries_[static_cast<std::size_t>(sensor)].config.odometry,
+  switch (to_measurement(motion, odometries_[static_cast<std::size_t>(sensor)].config().odometry,
                          static_cast<std::uint8_t>(sensor), m)) {
     case Conversion::ok:
       return add_measurement(m, now_ns);
@@ -205,56 +204,14 @@ Verdict StateEstimator::add_odometry(int sensor, const OdometrySample& sample, s
   if (seconds_between(now_ns, sample.stamp_ns) > config_.future_tolerance_s) {
     return count(sensor, Verdict::from_the_future);
   }
-  Odometry& odometry = odometries_[static_cast<std::size_t>(sensor)];
-  const OdometryConfig& config = odometry.config.odometry;
-  const auto begin_anew = [&](Verdict verdict) {
-    odometry.anchor = odometry.previous = sample;
-    return verdict == Verdict::first ? verdict : count(sensor, verdict);
-  };
-  if (!odometry.previous || odometry.previous->frame != sample.frame) return begin_anew(Verdict::first);
-  const double step = seconds_between(odometry.previous->stamp_ns, sample.stamp_ns);
-  if (step == 0.0) return count(sensor, Verdict::duplicate);
-  if (step < 0.0 && step > -1.0) return count(sensor, Verdict::too_old);
-  if (step < 0.0 || step > config.max_interval_s) return begin_anew(Verdict::gap);
-
-  const auto motion_from = [&](const OdometrySample& from) {
-    RelativeMotion motion;
-    motion.from_ns = from.stamp_ns;
-    motion.to_ns = sample.stamp_ns;
-    motion.motion = from.pose.inverse() * sample.pose;
-    motion.information = sample.information;
-    motion.suspicion = sample.suspicion;
-    if (odometry.config.level) {
-      motion.level = level_of(from.pose.linear() * config.body_from_sensor.linear().transpose());
-    } else if (tilt_.ready()) {
-      motion.level = tilt_.level();
-    }
-    return motion;
-  };
+  OdometryTrack& track = odometries_[static_cast<std::size_t>(sensor)];
   Measurement m;
-  switch (to_measurement(motion_from(*odometry.anchor), config, static_cast<std::uint8_t>(sensor), m)) {
-    case Conversion::ok:
-      break;
-    case Conversion::not_finite:
-      return count(sensor, Verdict::malformed);
-    case Conversion::bad_interval:
-      return begin_anew(Verdict::gap);
-    case Conversion::implausible:
-      return begin_anew(Verdict::jump);
-  }
-  if (odometry.anchor->stamp_ns != odometry.previous->stamp_ns) {
-    Measurement last;  // the anchor may be seconds back: the motion of now is that of the last step
-    const Conversion converted =
-        to_measurement(motion_from(*odometry.previous), config, static_cast<std::uint8_t>(sensor), last);
-    if (converted == Conversion::implausible) return begin_anew(Verdict::jump);
-    m.motion = last.motion;
-  }
-  const Verdict verdict = insert(m, now_ns);
-  if (verdict == Verdict::fused) carry_attitude(odometry, odometry.previous->pose, sample);
-  odometry.previous = sample;
-  const bool keep = config.anchor_period_s > 0.0 && verdict == Verdict::fused &&
-                    seconds_between(odometry.anchor->stamp_ns, sample.stamp_ns) < config.anchor_period_s;
-  if (!keep) odometry.anchor = sample;
+  Verdict verdict =
+      track.follow(sample, tilt_.ready() ? std::optional<Eigen::Matrix3d>(tilt_.level()) : std::nullopt, m);
+  if (verdict != Verdict::fused) return count(sensor, verdict);
+  verdict = insert(m, now_ns);
+  if (verdict == Verdict::fused) carry_attitude(track, track.previous_pose(), sample);
+  track.accept(sample, verdict);
   if (verdict == Verdict::fused) maybe_stand_still(m.stamp_ns, now_ns);
   return count(sensor, verdict);
 }
@@ -330,12 +287,12 @@ void StateEstimator::maybe_stand_still(std::int64_t stamp_ns, std::int64_t now_n
 }
 
 // Height, roll and pitch are not filtered: the leading odometry's are carried along.
-void StateEstimator::carry_attitude(const Odometry& odometry, const Pose& from, const OdometrySample& to) {
-  const int index = static_cast<int>(&odometry - odometries_.data());
+void StateEstimator::carry_attitude(const OdometryTrack& track, const Pose& from, const OdometrySample& to) {
+  const int index = static_cast<int>(&track - odometries_.data());
   const bool leads = height_from_ < 0 || index <= height_from_ || height_ns_ == kNoStamp ||
                      seconds_between(height_ns_, to.stamp_ns) > 2.0 * config_.outage_s;
-  if (!odometry.config.level || !leads || replay_.head().sensors[static_cast<std::size_t>(index)].is_distrusted) return;
-  const Pose sensor_from_body = odometry.config.odometry.body_from_sensor.inverse();
+  if (!track.config().level || !leads || replay_.head().sensors[static_cast<std::size_t>(index)].is_distrusted) return;
+  const Pose sensor_from_body = track.config().odometry.body_from_sensor.inverse();
   height_ += (to.pose * sensor_from_body).translation().z() - (from * sensor_from_body).translation().z();
   tilt_from_odometry_ = level_of((to.pose * sensor_from_body).linear());
   height_from_ = index;
@@ -433,7 +390,7 @@ Status StateEstimator::status(std::int64_t now_ns) const {
     r.jumps = c.jumps;
     if (!r.healthy || i >= static_cast<int>(odometries_.size())) continue;
     ++healthy;
-    const Role role = odometries_[static_cast<std::size_t>(i)].config.role;
+    const Role role = odometries_[static_cast<std::size_t>(i)].config().role;
     single = role == Role::lidar ? Mode::lidar : role == Role::thermal ? Mode::thermal : Mode::other;
   }
   status.mode = !started_ ? Mode::initializing : healthy >= 2 ? Mode::fused : single;

@@ -10,45 +10,12 @@
 
 #include "components/state_estimator/config.hpp"
 #include "components/state_estimator/estimate.hpp"
+#include "components/state_estimator/odometry_track.hpp"
 #include "components/state_estimator/replay_buffer.hpp"
+#include "components/state_estimator/samples.hpp"
 #include "components/state_estimator/status.hpp"
 
 namespace adit::state_estimator {
-
-// What became of an input. Everything but `fused` and `first` is counted in the sensor's report.
-enum class Verdict {
-  fused,            // handed to the filter (its gate may still refuse it: see SensorReport)
-  first,            // the first pose of an odometry: the next one makes a motion
-  too_old,          // before the history
-  duplicate,        // this sensor and stamp are known
-  from_the_future,  // later than now
-  malformed,        // NaN, not a rotation, negative variance, ...
-  gap,              // not after the previous pose, or too long after it
-  jump,             // a motion beyond all limits: the odometry restarted
-  unknown_sensor,
-};
-
-struct OdometrySample {
-  std::int64_t stamp_ns = kNoStamp;
-  Pose pose = Pose::Identity();  // of the sensor frame in the odometry's own frame
-  // Information of the motion since the sample before (or of the pose in the local map, with anchor_period_s), right
-  // perturbation [rho; theta]; nothing: configured deviations.
-  std::optional<Matrix6d> information;
-  std::uint64_t frame = 0;  // another value: the odometry's frame is a new one (restart, re-initialization)
-  double suspicion = 0.0;
-};
-
-struct ImuSample {
-  std::int64_t stamp_ns = kNoStamp;
-  Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();    // rad/s, sensor axes
-  Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();  // m/s^2, sensor axes
-};
-
-struct GnssSample {
-  std::int64_t stamp_ns = kNoStamp;
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();        // m, antenna in odom (local level east-north frame)
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();  // m^2
-};
 
 // Motion between two instants with the covariance of exactly this motion: the prior for a front end. It contains what
 // the same front end delivered before `to`; a front end that optimizes with it must hand back the likelihood alone.
@@ -97,11 +64,6 @@ class StateEstimator {
   struct Counters {
     std::uint64_t too_old = 0, duplicates = 0, future = 0, malformed = 0, gaps = 0, jumps = 0;
   };
-  struct Odometry {
-    OdometrySensor config;
-    std::optional<OdometrySample> anchor;    // what the next motion starts from
-    std::optional<OdometrySample> previous;  // the sample before
-  };
 
   explicit StateEstimator(const Config& config);
   Verdict count(int sensor, Verdict verdict);
@@ -109,7 +71,7 @@ class StateEstimator {
   void restart_at(std::int64_t stamp_ns, std::int64_t pose_of_ns);
   Verdict insert(const Measurement& measurement, std::int64_t now_ns);
   void maybe_stand_still(std::int64_t stamp_ns, std::int64_t now_ns);
-  void carry_attitude(const Odometry& odometry, const Pose& from, const OdometrySample& to);
+  void carry_attitude(const OdometryTrack& track, const Pose& from, const OdometrySample& to);
   Estimate estimate_of(const FilterState& state) const;
 
   Config config_;
@@ -118,11 +80,12 @@ class StateEstimator {
   MapCorrection map_;
   Tilt tilt_;
   StandstillDetector standstill_;
-  std::vector<Odometry> odometries_;  // by sensor index
+  std::vector<OdometryTrack> odometries_;  // by sensor index
   std::vector<std::string> names_;
   std::array<Counters, kMaxSensors> counters_;
   int imu_ = -1, gnss_ = -1, zero_velocity_ = -1;
   bool started_ = false;
+  bool measured_ = false;  // something was fused: until then odom is where the body is
   std::int64_t now_ns_ = kNoStamp, published_ns_ = kNoStamp, zero_velocity_ns_ = kNoStamp;
   std::int64_t closure_ns_ = kNoStamp;
   std::uint64_t clock_jumps_ = 0, forgotten_motions_ = 0, replays_ = 0;

@@ -76,6 +76,13 @@ class StateEstimatorComponent final : public Component {
   Param<Switch> thermal_calibration_{*this, "thermal_calibration", Switch::preset, switches,
                                      "estimate scale and yaw bias of the thermal odometry"};
   Param<Switch> gates_{*this, "gates", Switch::preset, switches, "chi-square gates and the disagreement test"};
+  Param<Switch> adaptive_noise_{*this, "adaptive_noise", Switch::preset, switches,
+                                "scale each odometry's covariance by what its innovations show"};
+  // Of the vehicle; 0: the mode's own.
+  Param<double> jerk_{*this, "jerk", 0.0, Range{0.0, 1e4}, "spectral density [m^2/s^5]; a car 3, a walking robot 20"};
+  Param<double> yaw_jerk_{*this, "yaw_jerk", 0.0, Range{0.0, 1e4}, "the same of the heading [rad^2/s^5]; 0.1, 20"};
+  Param<double> slip_{*this, "slip", 0.0, Range{0.0, 10.0},
+                      "motion that is not along the heading, density [m^2/s]: a walking robot sways, 1e-3"};
   Param<double> thermal_scale_sigma_{*this, "thermal_scale_sigma", 0.1, Range{1e-4, 10.0},
                                      "of ln(scale) at the start: 0.02 with LiDAR depth"};
   Param<double> lidar_anchor_period_{
@@ -94,10 +101,22 @@ class StateEstimatorComponent final : public Component {
   Param<double> thermal_yaw_floor_{*this,        "thermal_yaw_floor", 5e-4,
                                    Unit::radian, Range{1e-6, 1.0},    "the same of its heading"};
   Param<Numbers> initial_pose_{*this, "initial_pose", Numbers{0, 0, 0}, "in odom_frame: x y [m], heading [rad]"};
+  Param<Numbers> initial_pose_sigma_{*this,
+                                     "initial_pose_sigma",
+                                     {},
+                                     "its deviations: of x and y [m], of the heading [rad]; empty: the mode's, small "
+                                     "because the robot's own start defines odom_frame"};
   Param<double> initial_speed_{
       *this, "initial_speed", 0.0, Unit::metre_per_second, Range{-60.0, 60.0}, "when the first measurement comes"};
   Param<double> initial_speed_sigma_{
       *this, "initial_speed_sigma", 1.0, Unit::metre_per_second, Range{1e-3, 60.0}, "its deviation"};
+  Param<double> silent_after_{*this,
+                              "silent_after",
+                              0.0,
+                              Unit::second,
+                              Range{0.0, 60.0},
+                              "without a measured motion nothing is published: for a "
+                              "prior, whose guess would be taken for news; 0: always"};
   Param<double> max_interval_{*this,        "max_interval",    0.5,
                               Unit::second, Range{0.01, 30.0}, "longer steps of an odometry are gaps"};
 
@@ -167,6 +186,10 @@ Result<void> StateEstimatorComponent::configure() {
     config_.odometries[1].odometry.calibration = {.scale = on, .yaw_bias = on};
   }
   config_.initial.sigma_scale = thermal_scale_sigma_;
+  if (adaptive_noise_ != Switch::preset) config_.adaptation.enabled = adaptive_noise_ == Switch::on;
+  if (jerk_ > 0.0) config_.process.noise.jerk = jerk_;
+  if (yaw_jerk_ > 0.0) config_.process.noise.yaw_jerk = yaw_jerk_;
+  if (slip_ > 0.0) config_.process.noise.position = slip_;
   if (gates_ != Switch::preset) config_.gate.enabled = config_.disagreement.enabled = gates_ == Switch::on;
   config_.imu.enabled = use_imu_;
   config_.imu.body_from_sensor = *imu;
@@ -187,6 +210,11 @@ Result<void> StateEstimatorComponent::configure_start_and_gnss() {
     return Error{ErrorCode::invalid_argument, param.name() + ": expected " + what};
   };
   if (Result<void> fine = numbers(initial_pose_, 3, "x y heading"); !fine) return fine;
+  if (!initial_pose_sigma_.value().empty()) {
+    if (Result<void> fine = numbers(initial_pose_sigma_, 2, "position heading"); !fine) return fine;
+    config_.initial.sigma_position = initial_pose_sigma_.value()[0];
+    config_.initial.sigma_yaw = initial_pose_sigma_.value()[1];
+  }
   if (Result<void> fine = numbers(gnss_antenna_, 2, "x y"); !fine) return fine;
   geodetic_origin_.reset();
   if (!gnss_origin_.value().empty()) {
@@ -302,6 +330,10 @@ void StateEstimatorComponent::on_tick(const TimerTick& tick) {
 void StateEstimatorComponent::publish(std::int64_t now) {
   const std::optional<Estimate> estimate = estimator_->publish(now);
   if (!estimate) return;
+  const std::int64_t measured = estimator_->state().last_motion_ns;
+  const bool unknown =
+      measured == state_estimator::kNoStamp || state_estimator::seconds_between(measured, now) > silent_after_;
+  if (silent_after_ > 0.0 && unknown) return;
   const double step =
       last_output_ns_ == state_estimator::kNoStamp ? 0.0 : state_estimator::seconds_between(last_output_ns_, now);
   distance_ += std::abs(estimate->speed) * std::clamp(step, 0.0, 1.0);

@@ -16,9 +16,10 @@ struct SensorReport {
   std::string name;
   bool healthy = false;  // fused something within outage_s and not distrusted
   bool distrusted = false;
-  double age_s = -1.0;  // since the last fused measurement; negative: never
-  double nis = 0.0;     // of the last examined measurement,
-  int nis_dof = 0;      // with so many rows
+  double age_s = -1.0;        // since the last fused measurement; negative: never
+  double nis = 0.0;           // of the last examined measurement,
+  int nis_dof = 0;            // with so many rows
+  double noise_factor = 1.0;  // on its covariance, found by its innovations
   double mean_nis_per_dof = 0.0;
   std::uint64_t accepted = 0, rejected = 0, distrusted_count = 0, unanchored = 0, uninformative = 0, forced = 0;
   std::uint64_t too_old = 0, duplicates = 0, future = 0, malformed = 0, gaps = 0, jumps = 0;
