@@ -72,6 +72,7 @@ TEST(PointMap, RemovesWhatIsFarAndReusesItsCells) {
   for (int i = 0; i < 300; ++i) {
     const Eigen::Vector3d centre(2.0 * i, 0.0, 0.0);
     map.add(random_points(500, centre, 4.0, static_cast<unsigned>(i)));
+    map.add(std::vector<Eigen::Vector3d>{centre});
     map.remove_far(centre, 20.0);
     if (i == 150) cells = map.cells();
   }
