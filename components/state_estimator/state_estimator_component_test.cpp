@@ -13,7 +13,7 @@
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/registry.hpp"
 #include "components/runtime/stamp.hpp"
-#include "components/state_estimator/synthetic_drive.hpp"
+#include "components/state_estimator/component_drive.hpp"
 
 namespace adit::state_estimator::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "components/state_estimator/synthetic_drive.hpp"
+#include "components/state_estimator/component_drive.hpp"
 
 #include <gtest/gtest.h>
 
