@@ -4,6 +4,7 @@
 #include "bringup/commands/file_commands.hpp"
 #include "bringup/commands/sweep_folder.hpp"
 #include "components/dataset/pcd_file.hpp"
+#include "components/geometry/rigid.hpp"
 #include "components/mapping/map_localizer.hpp"
 
 namespace adit {
@@ -57,10 +58,16 @@ void print_error(const Trajectory& poses, const Trajectory& truth) {
 Result<void> run(const Arguments& arguments) {
   Result<dataset::Dataset> dataset = open_clouds(arguments.input, arguments.file_rate);
   if (!dataset) return dataset.error();
-  const Result<Pose> mounting = pose_of(arguments.lidar_pose, "--lidar-pose");
+  const Result<Pose> mounting = pose_from_numbers(arguments.lidar_pose, "--lidar-pose");
   if (!mounting) return mounting.error();
   const Result<Trajectory> odometry = read_tum(arguments.odometry);
   if (!odometry) return odometry.error();
+  std::optional<Pose> given;
+  if (!arguments.start.empty()) {
+    const Result<Pose> start = pose_from_numbers(arguments.start, "--start");
+    if (!start) return start.error();
+    given = *start;
+  }
   Trajectory truth;
   if (!arguments.truth.empty()) {
     Result<Trajectory> read = read_tum(arguments.truth);
@@ -76,12 +83,7 @@ Result<void> run(const Arguments& arguments) {
     const Result<mapping::OwnedSweep> sweep = read_sweep(*dataset, i);
     if (!sweep) return sweep.error();
     if (!localizer) {
-      std::optional<Pose> start = interpolate(truth, mapping::end_ns(sweep->view()));
-      if (!arguments.start.empty()) {
-        const Result<Pose> given = pose_of(arguments.start, "--start");
-        if (!given) return given.error();
-        start = *given;
-      }
+      const std::optional<Pose> start = given ? given : interpolate(truth, mapping::end_ns(sweep->view()));
       if (!start) {
         ++left_out;
         continue;

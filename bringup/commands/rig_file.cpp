@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "components/geometry/rigid.hpp"
+
 namespace adit {
 
 Result<RigFile> read_rig_file(const std::string& path) {
@@ -40,9 +42,8 @@ Result<RigFile> read_rig_file(const std::string& path) {
 }
 
 Value::List pose_parameter(const Pose& pose) {
-  const Eigen::Vector3d t = pose.translation();
-  const Eigen::Quaterniond q(pose.linear());
-  return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+  const std::array<double, 7> v = numbers_of(pose);
+  return Value::List(v.begin(), v.end());
 }
 
 }  // namespace adit

@@ -1,7 +1,6 @@
 #include "bringup/commands/sweep_folder.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "components/dataset/pcd_file.hpp"
 
@@ -35,19 +34,6 @@ Result<mapping::OwnedSweep> read_sweep(const dataset::Dataset& dataset, std::siz
     if (time >= 0) sweep.seconds.push_back(row[time]);
   }
   return sweep;
-}
-
-Result<Pose> pose_of(const std::vector<double>& numbers, const std::string& option) {
-  if (numbers.size() != 7)
-    return Error{ErrorCode::invalid_argument, option + ": 7 numbers are wanted: x y z qx qy qz qw"};
-  const Eigen::Quaterniond q(numbers[6], numbers[3], numbers[4], numbers[5]);
-  if (!(std::abs(q.norm() - 1.0) < 0.01)) {
-    return Error{ErrorCode::invalid_argument, option + ": the quaternion's norm is not 1"};
-  }
-  Pose pose = Pose::Identity();
-  pose.linear() = q.normalized().toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]);
-  return pose;
 }
 
 }  // namespace adit

@@ -14,7 +14,4 @@ Result<mapping::OwnedSweep> read_sweep(const dataset::Dataset& dataset, std::siz
 // A folder of clouds; images are refused.
 Result<dataset::Dataset> open_clouds(const std::string& folder, double file_rate);
 
-// "x y z qx qy qz qw" as a command line has it.
-Result<Pose> pose_of(const std::vector<double>& numbers, const std::string& option);
-
 }  // namespace adit

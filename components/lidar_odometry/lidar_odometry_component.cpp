@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "adit_msgs/msg/localizability.hpp"
+#include "components/geometry/rigid.hpp"
 #include "components/geometry/trajectory.hpp"
 #include "components/lidar_odometry/config.hpp"
 #include "components/lidar_odometry/inertial_predictor.hpp"
@@ -129,21 +130,6 @@ class LidarOdometryComponent final : public Component {
   void report(const lidar_odometry::Estimate& estimate);
 };
 
-Result<Pose> pose_of(const Param<std::vector<double>>& param) {
-  const std::vector<double>& v = param.value();
-  if (v.size() != 7) {
-    return Error{ErrorCode::invalid_argument, param.name() + ": 7 numbers are wanted: x y z qx qy qz qw"};
-  }
-  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-  if (!Eigen::Map<const Eigen::VectorXd>(v.data(), 7).allFinite() || !(std::abs(q.norm() - 1.0) < 0.01)) {
-    return Error{ErrorCode::invalid_argument, param.name() + ": not finite, or the quaternion's norm is not 1"};
-  }
-  Pose pose = Pose::Identity();
-  pose.linear() = q.normalized().toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
-  return pose;
-}
-
 Result<void> LidarOdometryComponent::configure() {
   lidar_odometry::Config config;
   config.mode = mode_;
@@ -156,9 +142,9 @@ Result<void> LidarOdometryComponent::configure() {
   config.threads = static_cast<int>(threads_.value());
   if (voxel_size_ > 0.0) config.kiss.voxel_size = config.genz.voxel_size = voxel_size_;
   if (Result<void> valid = lidar_odometry::check(config); !valid) return valid;
-  const Result<Pose> sensor = pose_of(lidar_pose_);
+  const Result<Pose> sensor = pose_from_numbers(lidar_pose_.value(), "lidar_pose");
   if (!sensor) return sensor.error();
-  const Result<Pose> imu = pose_of(imu_pose_);
+  const Result<Pose> imu = pose_from_numbers(imu_pose_.value(), "imu_pose");
   if (!imu) return imu.error();
   inertial_ = lidar_odometry::InertialPredictor({.lidar_from_imu = sensor->inverse() * *imu});
   engine_.emplace(config);

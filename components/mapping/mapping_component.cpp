@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "components/geometry/rigid.hpp"
 #include "components/mapping/map_file.hpp"
 #include "components/mapping/mapper.hpp"
 #include "components/mapping/sweep_buffer.hpp"
@@ -99,14 +100,9 @@ class MappingComponent final : public Component {
 };
 
 Result<void> MappingComponent::configure() {
-  const std::vector<double>& v = lidar_pose_.value();
-  if (v.size() != 7) return Error{ErrorCode::invalid_argument, "lidar_pose: 7 numbers are wanted: x y z qx qy qz qw"};
-  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-  if (!Eigen::Map<const Eigen::VectorXd>(v.data(), 7).allFinite() || !(std::abs(q.norm() - 1.0) < 0.01)) {
-    return Error{ErrorCode::invalid_argument, "lidar_pose: not finite, or the quaternion's norm is not 1"};
-  }
-  body_from_sensor_.linear() = q.normalized().toRotationMatrix();
-  body_from_sensor_.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
+  const Result<Pose> sensor = pose_from_numbers(lidar_pose_.value(), "lidar_pose");
+  if (!sensor) return sensor.error();
+  body_from_sensor_ = *sensor;
   const std::string& file = map_file_.value();
   if (!file.empty() && !file.ends_with(".pcd") && !file.ends_with(".ply")) {
     return Error{ErrorCode::invalid_argument, "map_file: " + file + " ends neither in .pcd nor in .ply"};

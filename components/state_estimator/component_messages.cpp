@@ -69,21 +69,6 @@ std::uint8_t mode_of(const Status& status) {
 
 }  // namespace
 
-Result<Pose> pose_of(const std::vector<double>& v, const std::string& name) {
-  if (v.size() != 7) {
-    return Error{ErrorCode::invalid_argument, name + ": 7 numbers are wanted: x y z qx qy qz qw"};
-  }
-  const bool finite = Eigen::Map<const Eigen::Matrix<double, 7, 1>>(v.data()).allFinite();
-  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-  if (!finite || !(std::abs(q.norm() - 1.0) < 0.01)) {
-    return Error{ErrorCode::invalid_argument, name + ": not finite, or the quaternion's norm is not 1"};
-  }
-  Pose pose = Pose::Identity();
-  pose.linear() = q.normalized().toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
-  return pose;
-}
-
 std::optional<Matrix6d> reported_information(const Odometry& message, const Eigen::Matrix3d& rotation) {
   const Matrix6d covariance =
       Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message.pose.covariance.data());

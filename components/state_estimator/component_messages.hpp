@@ -26,9 +26,6 @@ struct Arrival {
 enum Input : std::size_t { kLidarInput, kThermalInput, kImuInput, kGnssInput, kInputs };
 using Arrivals = std::array<Arrival, kInputs>;
 
-// Seven numbers x y z qx qy qz qw. The error names the parameter.
-Result<Pose> pose_of(const std::vector<double>& numbers, const std::string& name);
-
 // nav_msgs/Odometry has the covariance about the axes of the parent frame; the estimator takes the information of the
 // right perturbation. All zero means unknown; what is no covariance is not used either. `rotation`: the pose's.
 std::optional<Matrix6d> reported_information(const nav_msgs::msg::Odometry& message, const Eigen::Matrix3d& rotation);

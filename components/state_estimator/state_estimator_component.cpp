@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "adit_msgs/msg/fusion_status.hpp"
+#include "components/geometry/rigid.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
 #include "components/state_estimator/component_messages.hpp"
@@ -161,9 +162,9 @@ Result<void> StateEstimatorComponent::configure() {
   config_ = mode_ == Preset::paper         ? Config::paper()
             : mode_ == Preset::predecessor ? Config::predecessor()
                                            : Config::standard();
-  const Result<Pose> lidar = state_estimator::pose_of(lidar_pose_, "lidar_pose"),
-                     thermal = state_estimator::pose_of(thermal_pose_, "thermal_pose"),
-                     imu = state_estimator::pose_of(imu_pose_, "imu_pose");
+  const Result<Pose> lidar = pose_from_numbers(lidar_pose_.value(), "lidar_pose"),
+                     thermal = pose_from_numbers(thermal_pose_.value(), "thermal_pose"),
+                     imu = pose_from_numbers(imu_pose_.value(), "imu_pose");
   for (const Result<Pose>* pose : {&lidar, &thermal, &imu}) {
     if (!*pose) return pose->error();
   }

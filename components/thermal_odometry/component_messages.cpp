@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "adit_msgs/msg/thermal_health.hpp"
+#include "components/geometry/rigid.hpp"
 #include "components/runtime/stamp.hpp"
 #include "components/thermal_odometry/camera.hpp"
 #include "idl/thermal_frame_view.hpp"
@@ -43,18 +44,11 @@ std::int64_t nanoseconds(const builtin_interfaces::msg::Time& stamp) {
   return to_time(stamp).time_since_epoch().count();
 }
 
-Result<std::optional<Pose>> pose_of(const std::vector<double>& v, const std::string& name) {
-  if (v.empty()) return std::optional<Pose>();
-  if (v.size() != 7) return Error{ErrorCode::invalid_argument, name + ": 7 numbers are wanted: x y z qx qy qz qw"};
-  const bool finite = Eigen::Map<const Eigen::Matrix<double, 7, 1>>(v.data()).allFinite();
-  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-  if (!finite || !(std::abs(q.norm() - 1.0) < 0.01)) {
-    return Error{ErrorCode::invalid_argument, name + ": not finite, or the quaternion's norm is not 1"};
-  }
-  Pose pose = Pose::Identity();
-  pose.linear() = q.normalized().toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
-  return std::optional<Pose>(pose);
+Result<std::optional<Pose>> pose_if_known(const std::vector<double>& numbers, const std::string& name) {
+  if (numbers.empty()) return std::optional<Pose>();
+  const Result<Pose> pose = pose_from_numbers(numbers, name);
+  if (!pose) return pose.error();
+  return std::optional<Pose>(*pose);
 }
 
 Result<CameraModel> camera_of(const sensor_msgs::msg::CameraInfo& info) {

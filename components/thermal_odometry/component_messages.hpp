@@ -34,8 +34,8 @@ namespace adit::thermal_odometry {
 
 std::int64_t nanoseconds(const builtin_interfaces::msg::Time& stamp);
 
-// Seven numbers x y z qx qy qz qw; none: not known.
-Result<std::optional<Pose>> pose_of(const std::vector<double>& numbers, const std::string& name);
+// As pose_from_numbers; no numbers: not known.
+Result<std::optional<Pose>> pose_if_known(const std::vector<double>& numbers, const std::string& name);
 
 // Errors: an unknown distortion model, a number of coefficients that does not fit, no size, no focal length.
 Result<CameraModel> camera_of(const sensor_msgs::msg::CameraInfo& info);

@@ -11,6 +11,7 @@
 
 #include "adit_msgs/msg/thermal_frame.hpp"
 #include "adit_msgs/msg/thermal_health.hpp"
+#include "components/geometry/rigid.hpp"
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/stamp.hpp"
 #include "components/thermal_odometry/test_scene.hpp"
@@ -384,9 +385,8 @@ class FuzzedDrive final : public OfflineSource {
 };
 
 Value::List numbers(const Pose& pose) {
-  const Eigen::Vector3d t = pose.translation();
-  const Eigen::Quaterniond q(pose.linear());
-  return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+  const std::array<double, 7> v = numbers_of(pose);
+  return Value::List(v.begin(), v.end());
 }
 
 }  // namespace

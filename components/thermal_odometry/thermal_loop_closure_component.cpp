@@ -79,8 +79,8 @@ class ThermalLoopClosureComponent final : public Component {
 Result<void> ThermalLoopClosureComponent::configure() {
   camera_.reset();
   if (!enabled_) return {};
-  const Result<std::optional<Pose>> thermal = thermal_odometry::pose_of(thermal_pose_, "thermal_pose");
-  const Result<std::optional<Pose>> lidar = thermal_odometry::pose_of(lidar_pose_, "lidar_pose");
+  const Result<std::optional<Pose>> thermal = thermal_odometry::pose_if_known(thermal_pose_, "thermal_pose");
+  const Result<std::optional<Pose>> lidar = thermal_odometry::pose_if_known(lidar_pose_, "lidar_pose");
   if (!thermal) return thermal.error();
   if (!lidar) return lidar.error();
   if (!*thermal || !*lidar) {

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "adit_msgs/msg/thermal_frame.hpp"
+#include "components/geometry/rigid.hpp"
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/stamp.hpp"
 #include "components/runtime/testing/recording.hpp"
@@ -33,9 +34,8 @@ using tf2_msgs::msg::TFMessage;
 using thermal_odometry::TestScene;
 
 Value::List numbers(const Pose& pose) {
-  const Eigen::Vector3d t = pose.translation();
-  const Eigen::Quaterniond q(pose.linear());
-  return {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
+  const std::array<double, 7> v = numbers_of(pose);
+  return Value::List(v.begin(), v.end());
 }
 
 struct Outcome {

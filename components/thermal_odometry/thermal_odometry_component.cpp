@@ -131,8 +131,8 @@ Result<void> ThermalOdometryComponent::configure() {
   calibration_error_.clear();
   camera_from_lidar_.reset();
   prior_motion_.reset();
-  const Result<std::optional<Pose>> thermal = thermal_odometry::pose_of(thermal_pose_, "thermal_pose");
-  const Result<std::optional<Pose>> lidar = thermal_odometry::pose_of(lidar_pose_, "lidar_pose");
+  const Result<std::optional<Pose>> thermal = thermal_odometry::pose_if_known(thermal_pose_, "thermal_pose");
+  const Result<std::optional<Pose>> lidar = thermal_odometry::pose_if_known(lidar_pose_, "lidar_pose");
   if (!thermal) return thermal.error();
   if (!lidar) return lidar.error();
   if (*lidar && !*thermal) return Error{ErrorCode::invalid_argument, "lidar_pose needs thermal_pose beside it"};

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <vector>
 
+#include "components/geometry/rigid.hpp"
 #include "components/geometry/trajectory.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
@@ -45,19 +46,9 @@ class TrajectoryWriterComponent final : public Component {
       if (!covariance_file_) return Error{ErrorCode::io, beside.string() + ": cannot write: " + std::strerror(errno)};
       covariance_file_ << "# stamp xx xy xa yy ya aa (m, rad)\n" << std::flush;
     }
-    return read_sensor_pose();
-  }
-
-  Result<void> read_sensor_pose() {
-    const Numbers& v = sensor_pose_.value();
-    if (v.size() != 7) return Error{ErrorCode::invalid_argument, "sensor_pose: 7 numbers are wanted"};
-    const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-    const Eigen::Vector3d t(v[0], v[1], v[2]);
-    if (!t.allFinite() || !(std::abs(q.norm() - 1.0) < 0.01)) {
-      return Error{ErrorCode::invalid_argument, "sensor_pose: not finite, or the quaternion's norm is not 1"};
-    }
-    body_from_sensor_.linear() = q.normalized().toRotationMatrix();
-    body_from_sensor_.translation() = t;
+    const Result<Pose> sensor = pose_from_numbers(sensor_pose_.value(), "sensor_pose");
+    if (!sensor) return sensor.error();
+    body_from_sensor_ = *sensor;
     return {};
   }
 
