@@ -9,8 +9,7 @@
 
 #include "bringup/commands/rig_file.hpp"
 #include "components/dataset/bag_reader.hpp"
-#include "components/dataset/dataset.hpp"
-#include "components/dataset/pcd_file.hpp"
+#include "components/dataset/cloud_folder.hpp"
 #include "components/dataset_player/recorded_messages.hpp"
 #include "components/runtime/stamp.hpp"
 #include "sensor_msgs/msg/imu.hpp"
@@ -87,9 +86,7 @@ class FolderRecording final : public LidarRecording {
       prior_sent_ = true;
       return true;
     }
-    const Result<dataset::PointFile> file = dataset_.kind == dataset::Dataset::Kind::pcd
-                                                ? dataset::read_pcd(entry.path)
-                                                : dataset::read_bin(entry.path, entry.points);
+    const Result<dataset::PointFile> file = dataset::read_cloud(dataset_, next_);
     if (!file) return file.error();
     auto message = std::make_shared<PointCloud2>();
     dataset_player::fill(*file, stamp, "lidar", *message);
@@ -161,11 +158,8 @@ Result<std::unique_ptr<LidarRecording>> open_bag(const std::string& path) {
 }
 
 Result<std::unique_ptr<LidarRecording>> open_folder(const std::string& path, LidarRecordingOptions options) {
-  Result<dataset::Dataset> dataset = dataset::open_dataset(path, options.file_rate);
+  Result<dataset::Dataset> dataset = dataset::open_clouds(path, options.file_rate);
   if (!dataset) return dataset.error();
-  if (dataset->kind == dataset::Dataset::Kind::png16) {
-    return Error{ErrorCode::invalid_argument, path + " holds images, not clouds"};
-  }
   std::vector<std::shared_ptr<const Imu>> imu;
   if (!options.imu.empty()) {
     auto read = read_imu(options.imu);

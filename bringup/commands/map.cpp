@@ -2,6 +2,7 @@
 
 #include "bringup/commands/file_commands.hpp"
 #include "bringup/commands/sweep_folder.hpp"
+#include "components/dataset/cloud_folder.hpp"
 #include "components/geometry/rigid.hpp"
 #include "components/mapping/map_file.hpp"
 #include "components/mapping/mapper.hpp"
@@ -24,7 +25,7 @@ Trajectory of_sensor(Trajectory body, const Pose& mounting) {
 }
 
 Result<void> run(const Arguments& arguments) {
-  Result<dataset::Dataset> dataset = open_clouds(arguments.input, arguments.file_rate);
+  Result<dataset::Dataset> dataset = dataset::open_clouds(arguments.input, arguments.file_rate);
   if (!dataset) return dataset.error();
   const Result<Pose> mounting = pose_from_numbers(arguments.lidar_pose, "--lidar-pose");
   if (!mounting) return mounting.error();

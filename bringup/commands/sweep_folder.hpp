@@ -11,7 +11,4 @@ namespace adit {
 // Times are seconds after the sweep's start where the file has them, intensity 0 where it has none.
 Result<mapping::OwnedSweep> read_sweep(const dataset::Dataset& dataset, std::size_t index);
 
-// A folder of clouds; images are refused.
-Result<dataset::Dataset> open_clouds(const std::string& folder, double file_rate);
-
 }  // namespace adit

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "bringup/commands/rig_file.hpp"
+#include "components/dataset/cloud_folder.hpp"
 #include "components/dataset_player/recorded_messages.hpp"
 #include "components/runtime/stamp.hpp"
 
@@ -126,8 +127,8 @@ Result<bool> ThermalFolderSource::next(OfflineMessage& out) {
 }
 
 Result<void> ThermalFolderSource::read_cloud() {
-  const dataset::Entry& entry = folder_.clouds.entries[next_cloud_++];
-  const Result<dataset::PointFile> file = dataset::read_bin(entry.path, entry.points);
+  const dataset::Entry& entry = folder_.clouds.entries[next_cloud_];
+  const Result<dataset::PointFile> file = dataset::read_cloud(folder_.clouds, next_cloud_++);
   if (!file) return file.error();
   auto message = std::make_shared<PointCloud2>();
   dataset_player::fill(*file, Time(Duration(entry.stamp_ns)), "lidar", *message);

@@ -1,8 +1,7 @@
 #include <filesystem>
 
 #include "bringup/offline/source.hpp"
-#include "components/dataset/dataset.hpp"
-#include "components/dataset/pcd_file.hpp"
+#include "components/dataset/cloud_folder.hpp"
 #include "components/dataset_player/recorded_messages.hpp"
 #include "components/geometry/trajectory.hpp"
 
@@ -29,12 +28,9 @@ class FolderSource final : public Source {
                                                      std::move(message));
       return true;
     }
-    const dataset::Entry& entry = dataset_.entries[next_++];
-    const Result<dataset::PointFile> file = dataset_.kind == dataset::Dataset::Kind::pcd
-                                                ? dataset::read_pcd(entry.path)
-                                                : dataset::read_bin(entry.path, entry.points);
+    const Time stamp{Duration(dataset_.entries[next_].stamp_ns)};
+    const Result<dataset::PointFile> file = dataset::read_cloud(dataset_, next_++);
     if (!file) return file.error();
-    const Time stamp{Duration(entry.stamp_ns)};
     auto message = std::make_shared<sensor_msgs::msg::PointCloud2>();
     dataset_player::fill(*file, stamp, "lidar", *message);
     out = offline_message<sensor_msgs::msg::PointCloud2>("/lidar/points", stamp, std::move(message));
@@ -51,11 +47,8 @@ class FolderSource final : public Source {
 }  // namespace
 
 Result<std::unique_ptr<Source>> open_folder(const std::string& path, const SourceOptions& options) {
-  Result<dataset::Dataset> dataset = dataset::open_dataset(path, 10.0);
+  Result<dataset::Dataset> dataset = dataset::open_clouds(path, 10.0);
   if (!dataset) return dataset.error();
-  if (dataset->kind == dataset::Dataset::Kind::png16) {
-    return Error{ErrorCode::invalid_argument, path + " holds images, not clouds"};
-  }
   Trajectory truth;
   const std::filesystem::path truth_file = std::filesystem::path(path) / "gt_base.tum";
   if (options.topics.contains("/ground_truth/odometry") && std::filesystem::exists(truth_file)) {

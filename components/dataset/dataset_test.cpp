@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "components/dataset/cloud_folder.hpp"
 #include "components/dataset/png16.hpp"
 #include "components/dataset/png8.hpp"
 #include "components/dataset/point_file.hpp"
@@ -88,6 +89,7 @@ TEST_F(DatasetTest, ImagesByNumberWithSecondsKeepEveryBit) {
   const Result<Dataset> dataset = open_dataset(root_.string(), 10.0);
   ASSERT_TRUE(dataset) << dataset.error().message;
   EXPECT_EQ(dataset->kind, Dataset::Kind::png16);
+  EXPECT_THAT(open_clouds(root_.string(), 10.0).error().message, HasSubstr("images, not clouds"));
   EXPECT_EQ(dataset->entries[0].stamp_ns, 40'000'000);
   const Result<Image16> read = read_png16(dataset->entries[0].path);
   ASSERT_TRUE(read) << read.error().message;

@@ -5,8 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "components/dataset/dataset.hpp"
-#include "components/dataset/pcd_file.hpp"
+#include "components/dataset/cloud_folder.hpp"
 #include "components/dataset_player/recorded_messages.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
@@ -63,7 +62,7 @@ class DatasetPlayerComponent final : public Component {
   void tick();
   void answered(Time stamp);
   void play_next();
-  Result<void> publish(const dataset::Entry& entry);
+  Result<void> publish(std::size_t index);
   void schedule();
   void finish_pass();
   void show_progress(bool last);
@@ -125,7 +124,7 @@ void DatasetPlayerComponent::tick() {
   const double waited = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_time_).count();
   if (!answered_once_ && waited > 0.5 * (resent_ + 1) && waited < answer_timeout_) {
     ++resent_;
-    if (Result<void> sent = publish(dataset_.entries[next_ - 1]); !sent) log().error("{}", sent.error().message);
+    if (Result<void> sent = publish(next_ - 1); !sent) log().error("{}", sent.error().message);
     return;
   }
   if (waited < answer_timeout_) return;
@@ -143,7 +142,7 @@ void DatasetPlayerComponent::answered(Time stamp) {
 
 void DatasetPlayerComponent::play_next() {
   if (next_ == dataset_.entries.size()) return finish_pass();
-  if (Result<void> sent = publish(dataset_.entries[next_]); !sent) {
+  if (Result<void> sent = publish(next_); !sent) {
     health(Health::error, sent.error().message);
     log().error("{}: left out", sent.error().message);
   } else {
@@ -155,7 +154,8 @@ void DatasetPlayerComponent::play_next() {
   if (!lockstep()) schedule();
 }
 
-Result<void> DatasetPlayerComponent::publish(const dataset::Entry& entry) {
+Result<void> DatasetPlayerComponent::publish(std::size_t index) {
+  const dataset::Entry& entry = dataset_.entries[index];
   const Time stamp(Duration(entry.stamp_ns + loop_offset_ns_));
   last_stamp_ = stamp;
   if (clock_topic_) {
@@ -182,9 +182,7 @@ Result<void> DatasetPlayerComponent::publish(const dataset::Entry& entry) {
     }
     return {};
   }
-  const Result<dataset::PointFile> file = dataset_.kind == dataset::Dataset::Kind::pcd
-                                              ? dataset::read_pcd(entry.path)
-                                              : dataset::read_bin(entry.path, entry.points);
+  const Result<dataset::PointFile> file = dataset::read_cloud(dataset_, index);
   if (!file) return file.error();
   Loan<PointCloud2> cloud = points_.loan();
   dataset_player::fill(*file, stamp, frame_id_.value(), *cloud);
