@@ -43,12 +43,12 @@ double seconds(std::int64_t from_ns, std::int64_t to_ns) {
 
 }  // namespace
 
-InertialPredictor::InertialPredictor(const InertialConfig& config) : config_(config), samples_(capacity) {
+InertialPredictor::InertialPredictor(const InertialConfig& config) : config_(config) {
   poses_.reserve(1024);
 }
 
 void InertialPredictor::clear() {
-  first_ = count_ = 0;
+  samples_.clear();
   refused_in_a_row_ = contradictions_in_a_row_ = 0;
   state_.reset();
   predicted_.reset();
@@ -65,32 +65,20 @@ bool InertialPredictor::add(const InertialSample& sample) {
     ++counters_.refused;
     return false;
   }
-  if (count_ > 0 && sample.stamp_ns <= newest_ns()) {
+  if (!samples_.empty() && sample.stamp_ns <= newest_ns()) {
     ++counters_.refused;
     refused_in_a_row_ = refused_in_a_row_ > 0 && sample.stamp_ns > refused_stamp_ ? refused_in_a_row_ + 1 : 1;
     refused_stamp_ = sample.stamp_ns;
     if (refused_in_a_row_ < samples_to_believe) return false;
-    first_ = count_ = 0;
+    samples_.clear();
   }
   refused_in_a_row_ = 0;
-  if (count_ == capacity) {
-    first_ = (first_ + 1) % capacity;
-    --count_;
-  }
-  samples_[(first_ + count_) % capacity] = sample;
-  ++count_;
+  samples_.push(sample);
   return true;
 }
 
 bool InertialPredictor::covers(std::int64_t from_ns, std::int64_t to_ns) const {
-  if (usable_ < 2 || seconds(from_ns, at(0).stamp_ns) > config_.max_extrapolation_s ||
-      seconds(at(usable_ - 1).stamp_ns, to_ns) > config_.max_extrapolation_s) {
-    return false;
-  }
-  for (std::size_t i = usable_ - 1; i > 0 && at(i).stamp_ns > from_ns; --i) {
-    if (at(i - 1).stamp_ns < to_ns && seconds(at(i - 1).stamp_ns, at(i).stamp_ns) > config_.max_gap_s) return false;
-  }
-  return true;
+  return usable_ >= 2 && samples_.covers(from_ns, to_ns, usable_, config_.max_extrapolation_s, config_.max_gap_s);
 }
 
 // Between two samples the cubic through the four around (a gait's rates bend within a sample), or the line at the ends
@@ -99,17 +87,17 @@ bool InertialPredictor::covers(std::int64_t from_ns, std::int64_t to_ns) const {
 InertialSample InertialPredictor::reading(std::int64_t stamp_ns) const {
   std::size_t low = 0;
   std::size_t high = usable_ - 1;
-  if (stamp_ns <= at(low).stamp_ns) return at(low);
+  if (stamp_ns <= samples_[low].stamp_ns) return samples_[low];
   while (high - low > 1) {
     const std::size_t middle = (low + high) / 2;
-    (at(middle).stamp_ns <= stamp_ns ? low : high) = middle;
+    (samples_[middle].stamp_ns <= stamp_ns ? low : high) = middle;
   }
-  const double period = seconds(at(low).stamp_ns, at(high).stamp_ns);
-  const double t = seconds(at(low).stamp_ns, stamp_ns) / period;
-  if (t > 2.0) return at(high);
+  const double period = seconds(samples_[low].stamp_ns, samples_[high].stamp_ns);
+  const double t = seconds(samples_[low].stamp_ns, stamp_ns) / period;
+  if (t > 2.0) return samples_[high];
   std::array<double, 4> weight{0.0, 1.0 - t, t, 0.0};
   const auto beside = [&](std::size_t i) {
-    return std::abs(seconds(at(i).stamp_ns, at(i + 1).stamp_ns) - period) < 0.2 * period;
+    return std::abs(seconds(samples_[i].stamp_ns, samples_[i + 1].stamp_ns) - period) < 0.2 * period;
   };
   const bool four = low > 0 && high + 1 < usable_ && beside(low - 1) && beside(high);
   if (four) {  // Lagrange's, of equal steps
@@ -119,7 +107,7 @@ InertialSample InertialPredictor::reading(std::int64_t stamp_ns) const {
   InertialSample result;
   result.stamp_ns = stamp_ns;
   for (std::size_t k = four ? 0 : 1; k < (four ? 4u : 3u); ++k) {
-    const InertialSample& sample = at(low + k - 1);
+    const InertialSample& sample = samples_[low + k - 1];
     result.rate += weight[k] * sample.rate;
     result.acceleration += weight[k] * sample.acceleration;
   }
@@ -173,7 +161,7 @@ InertialPredictor::State InertialPredictor::at_rest(std::int64_t stamp_ns) const
   int count = 0;
   Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();  // of the sample in the frame at that instant
   std::int64_t now = stamp_ns;
-  while (now - step_ns >= std::max(stamp_ns - rest_ns, at(0).stamp_ns) && covers(now - step_ns, stamp_ns)) {
+  while (now - step_ns >= std::max(stamp_ns - rest_ns, samples_[0].stamp_ns) && covers(now - step_ns, stamp_ns)) {
     const InertialSample middle = reading(now - step_ns / 2);
     turned = turned * so3_exp(-ns * static_cast<double>(step_ns) * middle.rate);
     const Eigen::Vector3d force = turned * middle.acceleration;
@@ -254,10 +242,10 @@ std::optional<Prior> InertialPredictor::predict(const SweepStamps& sweep) {
   const std::int64_t from = first ? sweep.first_ns : std::min(sweep.first_ns, last_ns_);
   const std::int64_t to = std::max(sweep.last_ns, sweep.reference_ns);
   const bool later = first || sweep.reference_ns > last_ns_;
-  usable_ = count_;
-  while (usable_ > 0 && at(usable_ - 1).stamp_ns > to) --usable_;
+  usable_ = samples_.size();
+  while (usable_ > 0 && samples_[usable_ - 1].stamp_ns > to) --usable_;
   if (!later || to - from > rest_ns || !covers(from, to)) {
-    if (count_ > 0) ++counters_.uncovered;
+    if (!samples_.empty()) ++counters_.uncovered;
     return std::nullopt;
   }
   if (first) last_ns_ = sweep.reference_ns;

@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "components/geometry/stamped_ring.hpp"
 #include "components/lidar_odometry/estimate.hpp"
 #include "components/lidar_odometry/lidar_odometry.hpp"
 
@@ -64,10 +65,12 @@ class InertialPredictor {
   void correct(const Estimate& estimate);
 
   const InertialCounters& counters() const { return counters_; }
-  bool empty() const { return count_ == 0; }
+  bool empty() const { return samples_.empty(); }
   // Of the newest sample, and when the next one is to be expected. Precondition: !empty().
-  std::int64_t newest_ns() const { return at(count_ - 1).stamp_ns; }
-  std::int64_t next_ns() const { return count_ < 2 ? newest_ns() : 2 * newest_ns() - at(count_ - 2).stamp_ns; }
+  std::int64_t newest_ns() const { return samples_.newest().stamp_ns; }
+  std::int64_t next_ns() const {
+    return samples_.size() < 2 ? newest_ns() : 2 * newest_ns() - samples_[samples_.size() - 2].stamp_ns;
+  }
 
  private:
   static constexpr std::size_t capacity = 2048;  // 2 s at 1 kHz
@@ -85,7 +88,6 @@ class InertialPredictor {
     Covariance covariance = Covariance::Zero();
   };
 
-  const InertialSample& at(std::size_t i) const { return samples_[(first_ + i) % capacity]; }
   bool covers(std::int64_t from_ns, std::int64_t to_ns) const;
   InertialSample reading(std::int64_t stamp_ns) const;
   void advance(State& state, std::int64_t from_ns, std::int64_t to_ns, bool with_covariance) const;
@@ -96,8 +98,7 @@ class InertialPredictor {
   bool contradicts(const Vector6d& found, const Matrix6d& expected);
 
   InertialConfig config_;
-  std::vector<InertialSample> samples_;
-  std::size_t first_ = 0, count_ = 0;
+  StampedRing<InertialSample> samples_{capacity};
   std::size_t usable_ = 0;  // of the count, not after the sweep that is predicted
   std::int64_t refused_stamp_ = 0;
   int refused_in_a_row_ = 0;

@@ -24,46 +24,33 @@ double seconds(std::int64_t from_ns, std::int64_t to_ns) {
 }  // namespace
 
 MotionPrior::MotionPrior(const MotionPriorConfig& config)
-    : config_(config), to_sensor_(se3_adjoint(config.sensor.inverse())), samples_(capacity) {}
+    : config_(config), to_sensor_(se3_adjoint(config.sensor.inverse())) {}
 
 bool MotionPrior::add(const MotionSample& sample) {
   if (!is_rigid(sample.pose) || !sample.twist.allFinite() || sample.twist.norm() > 1e3) return false;
-  if (count_ > 0 && sample.stamp_ns <= at(count_ - 1).stamp_ns) return false;
-  if (count_ == capacity) {
-    first_ = (first_ + 1) % capacity;
-    --count_;
-  }
-  samples_[(first_ + count_) % capacity] = sample;
-  ++count_;
+  if (!samples_.empty() && sample.stamp_ns <= samples_.newest().stamp_ns) return false;
+  samples_.push(sample);
   return true;
 }
 
 void MotionPrior::clear() {
-  first_ = count_ = 0;
+  samples_.clear();
 }
 
 bool MotionPrior::covers(std::int64_t from_ns, std::int64_t to_ns) const {
-  if (count_ == 0 || to_ns <= from_ns) return false;
-  if (seconds(from_ns, at(0).stamp_ns) > config_.max_extrapolation_s ||
-      seconds(at(count_ - 1).stamp_ns, to_ns) > config_.max_extrapolation_s) {
-    return false;
-  }
-  for (std::size_t i = count_ - 1; i > 0 && at(i).stamp_ns > from_ns; --i) {
-    const bool within = at(i - 1).stamp_ns < to_ns;
-    if (within && seconds(at(i - 1).stamp_ns, at(i).stamp_ns) > config_.max_gap_s) return false;
-  }
-  return true;
+  return to_ns > from_ns &&
+         samples_.covers(from_ns, to_ns, samples_.size(), config_.max_extrapolation_s, config_.max_gap_s);
 }
 
 Pose MotionPrior::pose_at(std::int64_t stamp_ns) const {
   std::size_t next = 0;
-  while (next < count_ && at(next).stamp_ns < stamp_ns) ++next;
-  if (next == 0 || next == count_) {
-    const MotionSample& nearest = at(next == 0 ? 0 : count_ - 1);
+  while (next < samples_.size() && samples_[next].stamp_ns < stamp_ns) ++next;
+  if (next == 0 || next == samples_.size()) {
+    const MotionSample& nearest = samples_[next == 0 ? 0 : samples_.size() - 1];
     return nearest.pose * se3_exp(seconds(nearest.stamp_ns, stamp_ns) * nearest.twist);
   }
-  const MotionSample& a = at(next - 1);
-  const MotionSample& b = at(next);
+  const MotionSample& a = samples_[next - 1];
+  const MotionSample& b = samples_[next];
   return se3_interpolate(a.pose, b.pose, seconds(a.stamp_ns, stamp_ns) / seconds(a.stamp_ns, b.stamp_ns));
 }
 
@@ -72,10 +59,10 @@ Pose MotionPrior::integrated(std::int64_t from_ns, std::int64_t to_ns) const {
   Pose motion = Pose::Identity();
   std::int64_t now = from_ns;
   for (std::size_t next = 0; now < to_ns; ++next) {
-    const std::int64_t end = next < count_ ? std::min(at(next).stamp_ns, to_ns) : to_ns;
+    const std::int64_t end = next < samples_.size() ? std::min(samples_[next].stamp_ns, to_ns) : to_ns;
     if (end <= now) continue;
-    const Vector6d& before = at(next == 0 ? 0 : next - 1).twist;
-    const Vector6d& after = at(std::min(next, count_ - 1)).twist;
+    const Vector6d& before = samples_[next == 0 ? 0 : next - 1].twist;
+    const Vector6d& after = samples_[std::min(next, samples_.size() - 1)].twist;
     motion = motion * se3_exp(0.5 * seconds(now, end) * (before + after));
     now = end;
   }
@@ -83,7 +70,7 @@ Pose MotionPrior::integrated(std::int64_t from_ns, std::int64_t to_ns) const {
 }
 
 Matrix6d MotionPrior::velocity_covariance() const {
-  Matrix6d covariance = at(count_ - 1).twist_covariance;
+  Matrix6d covariance = samples_.newest().twist_covariance;
   const bool known = covariance.allFinite() && !covariance.isZero(0.0) && (covariance.diagonal().array() >= 0.0).all();
   if (!known) covariance.setZero();
   const auto set = [&](int first, double sigma) {
@@ -107,7 +94,7 @@ std::optional<Prior> MotionPrior::between(std::int64_t from_ns, std::int64_t to_
   prior.pose.linear() = orthonormalized(prior.pose.linear());
 
   const double dt = seconds(from_ns, to_ns);
-  const double ahead = std::max(0.0, seconds(at(count_ - 1).stamp_ns, to_ns));
+  const double ahead = std::max(0.0, seconds(samples_.newest().stamp_ns, to_ns));
   const double drift = vehicle_acceleration * ahead * dt;
   Matrix6d covariance = velocity_covariance();
   const bool rates_known = (covariance.diagonal().tail<3>().array() < good_rate_sigma * good_rate_sigma).all();

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
 
+#include "components/geometry/stamped_ring.hpp"
 #include "components/lidar_odometry/estimate.hpp"
 
 namespace adit::lidar_odometry {
@@ -45,7 +45,6 @@ class MotionPrior {
 
  private:
   static constexpr std::size_t capacity = 512;  // 2.5 s at 200 Hz
-  const MotionSample& at(std::size_t i) const { return samples_[(first_ + i) % capacity]; }
   bool covers(std::int64_t from_ns, std::int64_t to_ns) const;
   Pose pose_at(std::int64_t stamp_ns) const;
   Pose integrated(std::int64_t from_ns, std::int64_t to_ns) const;
@@ -53,8 +52,7 @@ class MotionPrior {
 
   MotionPriorConfig config_;
   Matrix6d to_sensor_;  // of velocities
-  std::vector<MotionSample> samples_;
-  std::size_t first_ = 0, count_ = 0;
+  StampedRing<MotionSample> samples_{capacity};
 };
 
 }  // namespace adit::lidar_odometry

@@ -8,26 +8,24 @@ namespace adit::thermal_odometry {
 bool PriorMotion::add(const BodyMotion& motion) {
   if (!motion.pose.matrix().allFinite() || !motion.twist.allFinite()) return false;
   constexpr std::int64_t clock_set_back_ns = 1'000'000'000;  // no estimator repeats or reorders as much as this
-  if (count_ > 0 && motion.stamp_ns < recent(0).stamp_ns - clock_set_back_ns) clear();
-  if (count_ > 0 && motion.stamp_ns <= recent(0).stamp_ns) return false;
-  ring_[next_] = motion;
-  next_ = (next_ + 1) % ring_.size();
-  count_ = std::min(count_ + 1, ring_.size());
+  if (!samples_.empty() && motion.stamp_ns < samples_.newest().stamp_ns - clock_set_back_ns) clear();
+  if (!samples_.empty() && motion.stamp_ns <= samples_.newest().stamp_ns) return false;
+  samples_.push(motion);
   return true;
 }
 
 std::optional<Pose> PriorMotion::at(std::int64_t stamp_ns) const {
-  if (count_ == 0) return std::nullopt;
-  const BodyMotion& newest = recent(0);
+  if (samples_.empty()) return std::nullopt;
+  const BodyMotion& newest = samples_.newest();
   if (stamp_ns >= newest.stamp_ns) {
     const double ahead = 1e-9 * static_cast<double>(stamp_ns - newest.stamp_ns);
     if (ahead > config_.max_extrapolation_s) return std::nullopt;
     return newest.pose * se3_exp(ahead * newest.twist);
   }
-  for (std::size_t age = 1; age < count_; ++age) {
-    const BodyMotion& before = recent(age);
+  for (std::size_t next = samples_.size() - 1; next > 0; --next) {
+    const BodyMotion& before = samples_[next - 1];
     if (before.stamp_ns > stamp_ns) continue;
-    const BodyMotion& after = recent(age - 1);
+    const BodyMotion& after = samples_[next];
     const auto span = static_cast<double>(after.stamp_ns - before.stamp_ns);
     if (1e-9 * span > config_.max_gap_s) return std::nullopt;
     return se3_interpolate(before.pose, after.pose, static_cast<double>(stamp_ns - before.stamp_ns) / span);
@@ -44,7 +42,7 @@ std::optional<Prior> PriorMotion::between(std::int64_t from_ns, std::int64_t to_
   prior.T_previous_current = camera.inverse() * (from->inverse() * *to) * camera;
   // Errors of the twist over the interval, about the body's axes at its start, carried to the camera's.
   const double dt = 1e-9 * static_cast<double>(to_ns - from_ns);
-  const Vector6d& reported = recent(0).twist_variance;
+  const Vector6d& reported = samples_.newest().twist_variance;
   Vector6d variance;
   for (int i = 0; i < 6; ++i) {
     const double usual = i < 3 ? config_.usual_speed_sigma : config_.usual_rate_sigma;

@@ -1,10 +1,10 @@
 // The motion of the camera between two instants as another odometry of the body tells it: what a tracker starts from.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 
+#include "components/geometry/stamped_ring.hpp"
 #include "components/thermal_odometry/frame.hpp"
 
 namespace adit::thermal_odometry {
@@ -17,7 +17,7 @@ struct BodyMotion {
   Vector6d twist_variance = Vector6d::Zero();  // not in (0, 1e5): unknown
 };
 
-// Keeps the last two seconds or so. No allocation.
+// Keeps the last two seconds or so. No allocation after construction.
 class PriorMotion {
  public:
   struct Config {
@@ -31,18 +31,15 @@ class PriorMotion {
 
   // False: not finite, or not newer than the last one.
   bool add(const BodyMotion& motion);
-  void clear() { count_ = 0; }
+  void clear() { samples_.clear(); }
   // Motion of the camera from one stamp to the other; its deviations grow with the time between.
   std::optional<Prior> between(std::int64_t from_ns, std::int64_t to_ns) const;
 
  private:
   std::optional<Pose> at(std::int64_t stamp_ns) const;
-  const BodyMotion& recent(std::size_t age) const { return ring_[(next_ + ring_.size() - 1 - age) % ring_.size()]; }
 
   Config config_;
-  std::array<BodyMotion, 256> ring_;
-  std::size_t next_ = 0;
-  std::size_t count_ = 0;
+  StampedRing<BodyMotion> samples_{256};
 };
 
 }  // namespace adit::thermal_odometry
