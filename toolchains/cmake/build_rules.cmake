@@ -16,7 +16,7 @@ if(ADIT_SANITIZE)
                                               -fno-sanitize-recover=all)
   # Instrumented code misleads these two of GCC (its manual, -fsanitize); the other presets keep them as errors.
   target_compile_options(adit_build INTERFACE
-                         $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized;-Wno-mismatched-new-delete>)
+                         $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-maybe-uninitialized;-Wno-mismatched-new-delete>)
   # Eigen aligns by hand under AddressSanitizer, unlike in the distribution's libraries built on it (Ceres), whose
   # inline functions the linker may take for ours: memory of one kind would be freed as the other.
   target_compile_definitions(adit_build INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
