@@ -1,5 +1,7 @@
 #include "components/state_estimator/correction.hpp"
 
+#include <type_traits>
+
 #include <Eigen/Cholesky>
 
 #include "components/geometry/se3.hpp"
@@ -60,6 +62,21 @@ bool correct_rows(FilterState& state, const Innovation& innovation) {
   return true;
 }
 
+// `work` for the number of rows as a constant; `otherwise` for a number that no measurement has.
+template <class Value, class Work>
+Value with_rows(const Innovation& innovation, Value otherwise, Work work) {
+  switch (innovation.rows) {
+    case 1:
+      return work(std::integral_constant<int, 1>());
+    case 2:
+      return work(std::integral_constant<int, 2>());
+    case 3:
+      return work(std::integral_constant<int, 3>());
+    default:
+      return otherwise;
+  }
+}
+
 }  // namespace
 
 double chi_square(int dof, Quantile quantile) {
@@ -78,42 +95,15 @@ Innovation project(const Linearization& linearization, const Measurement& measur
 }
 
 double squared_distance(const FilterState& state, const Innovation& innovation) {
-  switch (innovation.rows) {
-    case 1:
-      return distance<1>(state, innovation);
-    case 2:
-      return distance<2>(state, innovation);
-    case 3:
-      return distance<3>(state, innovation);
-    default:
-      return -1.0;
-  }
+  return with_rows(innovation, -1.0, [&](auto rows) { return distance<rows>(state, innovation); });
 }
 
 double noise_share(const FilterState& state, const Innovation& innovation) {
-  switch (innovation.rows) {
-    case 1:
-      return share<1>(state, innovation);
-    case 2:
-      return share<2>(state, innovation);
-    case 3:
-      return share<3>(state, innovation);
-    default:
-      return 0.0;
-  }
+  return with_rows(innovation, 0.0, [&](auto rows) { return share<rows>(state, innovation); });
 }
 
 bool correct(FilterState& state, const Innovation& innovation) {
-  switch (innovation.rows) {
-    case 1:
-      return correct_rows<1>(state, innovation);
-    case 2:
-      return correct_rows<2>(state, innovation);
-    case 3:
-      return correct_rows<3>(state, innovation);
-    default:
-      return false;
-  }
+  return with_rows(innovation, false, [&](auto rows) { return correct_rows<rows>(state, innovation); });
 }
 
 }  // namespace adit::state_estimator
