@@ -14,7 +14,7 @@
 #include "components/geometry/rigid.hpp"
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/stamp.hpp"
-#include "components/thermal_odometry/test_scene.hpp"
+#include "components/thermal_odometry/test_lap.hpp"
 #include "idl/point_cloud_writer.hpp"
 #include "nav_msgs/msg/odometry.hpp"
 #include "sensor_msgs/msg/camera_info.hpp"
@@ -41,44 +41,6 @@ bool shows_nothing(Fault fault) {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t period_ns = 40'000'000;
-constexpr int lap = 600;           // frames there and back
-constexpr double furthest = 30.0;  // m: the fastest frame moves at furthest * pi / lap / period = 3.9 m/s
-constexpr int scan_every = 3;      // frames
-
-// Frames and clouds of one lap, rendered once.
-class Lap {
- public:
-  Lap() {
-    scene_.camera = {160, 128, 105.0, 105.0, 79.5, 63.5, Distortion::none, {}};
-    for (int k = 0; k < lap; ++k) {
-      const Pose pose = pose_at(k);
-      const Frame frame = scene_.render(pose, 0);
-      pictures_.emplace_back(frame.data, frame.data + static_cast<std::ptrdiff_t>(frame.width) * frame.height);
-      if (k % scan_every != 0) continue;
-      const DepthPoints scan = scene_.scan(pose, 0);
-      std::vector<LidarPoint> points;
-      for (std::size_t i = 0; i < scan.points.size(); i += 3) {
-        const Eigen::Vector3f& p = scan.points[i];
-        points.push_back({p.x(), p.y(), p.z(), 1.0F, 0.0, 0});
-      }
-      clouds_.push_back(std::move(points));
-    }
-  }
-  static Pose pose_at(int k) {
-    const double phase = 2.0 * M_PI * k / lap;
-    Pose pose = TestScene::drive(3.0 * std::sin(phase), 0.0);  // the sway of the drive, closed after a lap
-    pose.translation().z() = 0.5 * furthest * (1.0 - std::cos(phase));
-    return pose;
-  }
-  const CameraModel& camera() const { return scene_.camera; }
-  const std::vector<std::uint16_t>& picture(int k) const { return pictures_[static_cast<std::size_t>(k)]; }
-  const std::vector<LidarPoint>& cloud(int k) const { return clouds_[static_cast<std::size_t>(k / scan_every)]; }
-
- private:
-  TestScene scene_;
-  std::vector<std::vector<std::uint16_t>> pictures_;
-  std::vector<std::vector<LidarPoint>> clouds_;
-};
 
 // One frame after the other with what belongs to it; checks what came of the last one before it makes the next.
 class FuzzedDrive final : public OfflineSource {
@@ -191,11 +153,11 @@ class FuzzedDrive final : public OfflineSource {
     ++figures_.frames;
     arrival_ = Time(Duration(1'000'000'000'000 + figures_.frames * period_ns));
     last_position_ = position_;
-    position_ = (position_ + 1) % lap;
+    position_ = (position_ + 1) % TestLap::frames;
     plan();
     published_ = measured_ = false;
     const std::int64_t stamp = clock_ns_ + figures_.frames * period_ns;
-    if (position_ % scan_every == 0) make_cloud(stamp);
+    if (position_ % TestLap::scan_every == 0) make_cloud(stamp);
     if (bad_ && fault_ == Fault::prior_wild) make_prior(stamp);
     if (bad_ && fault_ == Fault::camera_invalid) queue_invalid_info();
     make_picture(stamp);
@@ -357,12 +319,12 @@ class FuzzedDrive final : public OfflineSource {
       of_fault().sum_recovery += since_fault_;
     }
     if (since_fault_ <= 10 || !published_) return;
-    const Pose step = Lap::pose_at(last_position_).inverse() * Lap::pose_at(position_);
+    const Pose step = TestLap::pose_at(last_position_).inverse() * TestLap::pose_at(position_);
     const double error = std::abs(speed_ - step.translation().z() / (1e-9 * static_cast<double>(period_ns)));
     figures_.measured_wrong += error > 0.5 && error > 10.0 * speed_sigma_ ? 1 : 0;
   }
 
-  Lap lap_;
+  TestLap lap_;
   int frames_;
   std::mt19937 random_;
   std::vector<OfflineMessage> queue_;
