@@ -4,12 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "components/runtime/component_core.hpp"
-#include "components/runtime/inline_scheduler.hpp"
-#include "components/runtime/local_bus.hpp"
-#include "components/runtime/log_sink.hpp"
 #include "components/runtime/registry.hpp"
 #include "components/runtime/stamp.hpp"
+#include "components/runtime/testing/harness.hpp"
 #include "components/state_estimator/component_drive.hpp"
 
 namespace adit::state_estimator::test {
@@ -115,42 +112,29 @@ TEST(StateEstimatorComponent, ARestartedOdometryGoesOnFromWhereTheBodyIs) {
 
 // A recording that starts over: the runner's time never goes back, so the component is driven by hand.
 TEST(StateEstimatorComponent, AClockThatJumpsBackKeepsThePoseAndGoesOn) {
-  Clock clock(Clock::Source::simulated);
-  LocalBus bus;
-  InlineScheduler scheduler;
+  adit::testing::Harness harness(0, nullptr, Clock::Source::simulated);
   auto component = components::create("state_estimator");
   ASSERT_TRUE(component) << component.error().message;
-  ComponentCore& core = (*component)->core();
-  ASSERT_TRUE(core.bind(estimator(), std::make_shared<LogSink>()));
-  Environment environment;
-  environment.bus = &bus;
-  environment.clock = &clock;
-  environment.scheduler = &scheduler;
-  environment.offline = true;
-  std::string failure;
-  environment.on_failure = [&](ComponentCore&, const std::string& reason) { failure = reason; };
-  core.connect(environment);
+  harness.add(*std::move(component), estimator());
   std::vector<Odometry> poses;
   std::vector<FusionStatus> status;
-  bus.topic("/odometry").tap(into(poses));
-  bus.topic("/status").tap(into(status));
-  clock.set(Time(begin));
-  ASSERT_TRUE(core.configure());
-  ASSERT_TRUE(core.activate());
+  harness.bus.topic("/odometry").tap(into(poses));
+  harness.bus.topic("/status").tap(into(status));
+  harness.set_time(Time(begin));
+  harness.start();
   const auto play = [&](Duration from, int steps) {
     for (int i = 0; i < steps; ++i) {
       const Time now(from + i * 10ms);
-      const auto step = clock.set(now);
-      core.time_changed(step);
-      scheduler.run_until_idle();
+      harness.set_time(now);
+      harness.step();
       const double t = 0.01 * i;
       for (const auto& [topic, every] : {std::pair{"/lidar", 10}, std::pair{"/thermal", 4}}) {
         if (i % every != 0) continue;
         MessageInfo info;
         info.source_time = info.received_time = now;
         const Odometry message = odometry(now.time_since_epoch(), arc(t), topic);
-        bus.topic(topic).inject(std::make_shared<const Odometry>(message), {}, {}, info);
-        scheduler.run_until_idle();
+        harness.bus.topic(topic).inject(std::make_shared<const Odometry>(message), {}, {}, info);
+        harness.step();
       }
     }
   };
@@ -161,7 +145,7 @@ TEST(StateEstimatorComponent, AClockThatJumpsBackKeepsThePoseAndGoesOn) {
     ASSERT_GT(before, 200u);
     const auto at_jump = poses.back().pose.pose.position;
     play(back, 250);
-    EXPECT_EQ(failure, "");
+    EXPECT_TRUE(harness.failures.empty());
     ASSERT_GT(poses.size(), before + 200);
     for (const Odometry& pose : poses) ASSERT_TRUE(finite(pose));
     const auto after = poses[before].pose.pose.position;
@@ -170,7 +154,6 @@ TEST(StateEstimatorComponent, AClockThatJumpsBackKeepsThePoseAndGoesOn) {
     EXPECT_EQ(status.back().mode, FusionStatus::MODE_FUSED);
     EXPECT_LT(to_time(poses.back().header.stamp).time_since_epoch(), back + 2500ms);
   }
-  core.shutdown();
 }
 
 }  // namespace

@@ -6,13 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "components/runtime/component_core.hpp"
-#include "components/runtime/inline_scheduler.hpp"
-#include "components/runtime/local_bus.hpp"
-#include "components/runtime/log_sink.hpp"
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/registry.hpp"
 #include "components/runtime/stamp.hpp"
+#include "components/runtime/testing/harness.hpp"
 #include "components/state_estimator/component_drive.hpp"
 
 namespace adit::state_estimator::test {
@@ -147,33 +144,22 @@ TEST(StateEstimatorComponent, HoldsThePositionByFixes) {
 
 // A simulator that lets time go on in steps of 70 ms: consumers of the pose still get one each 10 ms.
 TEST(StateEstimatorComponent, PublishesWhatWasDueWithinAStepOfSimulatedTime) {
-  Clock clock(Clock::Source::simulated);
-  LocalBus bus;
-  InlineScheduler scheduler;
+  adit::testing::Harness harness(0, nullptr, Clock::Source::simulated);
   auto component = components::create("state_estimator");
-  ASSERT_TRUE(component);
-  ComponentCore& core = (*component)->core();
-  ASSERT_TRUE(core.bind(estimator(), std::make_shared<LogSink>()));
-  Environment environment;
-  environment.bus = &bus;
-  environment.clock = &clock;
-  environment.scheduler = &scheduler;
-  environment.offline = true;
-  core.connect(environment);
+  ASSERT_TRUE(component) << component.error().message;
+  harness.add(*std::move(component), estimator());
   std::vector<Odometry> poses;
-  bus.topic("/odometry").tap(into(poses));
-  clock.set(Time(begin));
-  ASSERT_TRUE(core.configure());
-  ASSERT_TRUE(core.activate());
+  harness.bus.topic("/odometry").tap(into(poses));
+  harness.set_time(Time(begin));
+  harness.start();
   for (int i = 1; i <= 20; ++i) {
-    core.time_changed(clock.set(Time(begin + i * 70ms)));
-    scheduler.run_until_idle();
+    harness.set_time(Time(begin + i * 70ms));
+    harness.step();
   }
   ASSERT_EQ(poses.size(), 140u);
   for (std::size_t i = 1; i < poses.size(); ++i) {
     EXPECT_EQ(to_time(poses[i].header.stamp) - to_time(poses[i - 1].header.stamp), 10ms) << i;
   }
-  core.shutdown();
 }
 
 }  // namespace

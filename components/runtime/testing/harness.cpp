@@ -28,7 +28,7 @@ Harness::~Harness() {
   }
 }
 
-void Harness::adopt(std::unique_ptr<Component> component, const ComponentConfig& config) {
+void Harness::add(std::unique_ptr<Component> component, const ComponentConfig& config) {
   require(component->core().bind(config, sink));
   Environment environment;
   environment.bus = &bus;

@@ -41,13 +41,14 @@ class Harness {
     C& made = *component;
     config.type = "test";
     config.name = name;
-    adopt(std::move(component), config);
+    add(std::move(component), config);
     return made;
   }
   template <class C>
   C& make(const std::string& name) {
     return make<C>(name, ComponentConfig{});
   }
+  void add(std::unique_ptr<Component> component, const ComponentConfig& config);
   // Configures and activates all.
   void start();
   void step() { inline_.run_until_idle(); }
@@ -59,7 +60,6 @@ class Harness {
   std::vector<std::string> failures;
 
  private:
-  void adopt(std::unique_ptr<Component> component, const ComponentConfig& config);
   std::unique_ptr<Participant> participant_;
   InlineScheduler inline_;
   std::unique_ptr<Executor> executor_;
