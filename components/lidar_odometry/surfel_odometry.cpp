@@ -1,6 +1,7 @@
 #include "components/lidar_odometry/surfel_odometry.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace adit::lidar_odometry {
 namespace {
@@ -13,6 +14,10 @@ constexpr double gate = 0.2;         // m
 constexpr double start_shift_step = 0.4;                         // m, along the sensor's x
 constexpr int start_shifts = 5;                                  // to either side: 20 m/s at 10 Hz
 constexpr double start_translation = 2.0, start_rotation = 0.2;  // m and rad, sigma of that prior
+constexpr int start_rounds = 3;       // of undistorting the first two sweeps with the velocity between them
+constexpr double settled_way = 2e-3;  // m, by which half a sweep's motion changed in the last round
+constexpr double mean_range = 10.0;   // m: turns radians into metres for that
+constexpr int lasting_changes = 5;    // of the twist, that its mean square is of
 
 bool translation_observable(const Directions& directions) {
   return directions.observable[0] && directions.observable[1] && directions.observable[2];
@@ -32,7 +37,8 @@ void SurfelOdometry::reset() {
   sweeps_ = 0;
   last_median_ = 0.0;
   last_twist_.reset();
-  twist_change2_.setZero();
+  twist_changes_ = 0;
+  redo_first_ = false;
 }
 
 // Without a prior from outside: the velocity stays, within what the vehicle's acceleration can change in dt. With one:
@@ -99,8 +105,15 @@ bool SurfelOdometry::position_known(const SweepTask& task) const {
          (task.information.diagonal().head<3>().array() > 1.0 / (known_translation * known_translation)).all();
 }
 
-void SurfelOdometry::note_twist(const Vector6d& twist, bool sampled) {
-  if (last_twist_ && !sampled) twist_change2_ += 0.2 * ((twist - *last_twist_).cwiseAbs2() - twist_change2_);
+void SurfelOdometry::note_twist(const Vector6d& twist, bool sampled, double dt) {
+  if (twist_changes_ == 0) {  // not seen yet: what the vehicle is capable of
+    twist_change2_ << Eigen::Vector3d::Constant(std::pow(config_.surfel.max_acceleration * dt, 2)),
+        Eigen::Vector3d::Constant(std::pow(config_.surfel.max_angular_acceleration * dt, 2));
+  }
+  if (last_twist_ && !sampled) {
+    twist_changes_ = std::min(twist_changes_ + 1, lasting_changes);
+    twist_change2_ += ((twist - *last_twist_).cwiseAbs2() - twist_change2_) / twist_changes_;
+  }
   last_twist_ = twist;
 }
 
@@ -150,6 +163,50 @@ SurfelRegistrationResult SurfelOdometry::search_start(const SweepTask& task, con
   return best;
 }
 
+void SurfelOdometry::keep_first(const SweepTwist& twist, const Pose& pose, const SweepMotion& sampled) {
+  first_.surfels.swap(surfels_);
+  first_.motion = sampled;
+  first_.sweep = twist;
+  if (twist.sampled != nullptr) first_.sweep.sampled = &first_.motion;
+  first_.pose = pose;
+  redo_first_ = true;
+}
+
+// The first sweep was undistorted without a velocity. Had the vehicle one, that sweep lies half its length behind where
+// its pose says, and the motion to the second sweep is by half a sweep's too long. So with the velocity found, the map
+// is made anew of the first sweep and the second one registered again, until the velocity stays.
+SurfelRegistrationResult SurfelOdometry::redo_start(SweepTwist twist, std::size_t needed,
+                                                    SurfelRegistrationResult result) {
+  if (!first_.sweep.times || !(twist.dt > 0.0)) return result;
+  const double half = 0.5 * (first_.sweep.times->last - first_.sweep.times->first);
+  Vector6d used = first_.sweep.predicted;
+  SurfelPrior prior;
+  prior.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (start_translation * start_translation)),
+      Eigen::Vector3d::Constant(1.0 / (start_rotation * start_rotation));
+  for (int round = 0; round < start_rounds && result.matched >= needed; ++round) {
+    const Vector6d change = half * (result.twist - used);
+    if (change.head<3>().norm() + mean_range * change.tail<3>().norm() < settled_way) break;
+    used = result.twist;
+    map_.clear();
+    map_.add(registration_.place(first_.surfels, first_.pose, first_.sweep, used), first_.pose.translation());
+    twist.last_middle = first_.sweep.middle(first_.pose, used);
+    twist.rotation_from_middles = true;
+    if (twist.sampled == nullptr) twist.predicted = used;
+    prior.pose = result.pose;
+    const SurfelRegistrationResult before = result;
+    result = registration_.align(surfels_, map_, prior.pose, prior, twist, wide_gate, needed, pool_);
+    fprintf(stderr,
+            "round %d used %.3f %.3f %.3f  %.4f %.4f %.4f -> %.3f %.3f %.3f %.4f %.4f %.4f rms %.4f (%.4f) assoc %d "
+            "matched %zu\n",
+            round, used[0], used[1], used[2], used[3], used[4], used[5], result.twist[0], result.twist[1],
+            result.twist[2], result.twist[3], result.twist[4], result.twist[5], result.rms_residual,
+            before.rms_residual, result.associations, result.matched);
+    result.associations += before.associations;
+    result.solves += before.solves;
+  }
+  return result;
+}
+
 void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
   estimate.pose = task.prediction;
   const Cloud image = image_.organise(task.cloud);
@@ -158,6 +215,7 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
   if (surfels_.size() < config_.min_points) {
     estimate.status = Status::too_few_points;
     last_twist_.reset();
+    redo_first_ = false;
     return;
   }
   const SweepTwist twist = twist_of(task);
@@ -182,6 +240,8 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     }
     const bool velocity_open = !task.external || (task.sampled.moving() && !position_known(task));
     if (sweeps_ == 1 && velocity_open) result = search_start(task, prior, twist, needed, result);
+    if (redo_first_ && velocity_open) result = redo_start(twist, needed, result);
+    redo_first_ = false;
     estimate.scan.matched = static_cast<std::uint32_t>(result.matched);
     estimate.scan.associations = static_cast<std::uint32_t>(result.associations);
     estimate.scan.solves = static_cast<std::uint32_t>(result.solves);
@@ -192,7 +252,7 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
       last_twist_.reset();
       return;
     }
-    note_twist(result.twist, task.sampled.moving());
+    note_twist(result.twist, task.sampled.moving(), task.dt);
     last_median_ = result.median_residual;
     estimate.pose = result.pose;
     Matrix6d turn = Matrix6d::Zero();
@@ -208,6 +268,7 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     estimate.status = estimate.localizability.unobservable() > 0 ? Status::degenerate : Status::ok;
   }
   map_.add(registration_.placed(), estimate.pose.translation());
+  if (sweeps_ == 0) keep_first(twist, estimate.pose, task.sampled);
   ++sweeps_;
   estimate.scan.map_cells = static_cast<std::uint32_t>(map_.cells());
   estimate.scan.evicted_cells = static_cast<std::uint32_t>(map_.evicted());

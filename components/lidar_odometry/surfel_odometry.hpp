@@ -24,10 +24,12 @@ class SurfelOdometry final : public Pipeline {
   SurfelPrior prior_of(const SweepTask& task) const;
   SweepTwist twist_of(const SweepTask& task) const;
   bool position_known(const SweepTask& task) const;
-  void note_twist(const Vector6d& twist, bool sampled);
+  void note_twist(const Vector6d& twist, bool sampled, double dt);
   Matrix6d widened(const Matrix6d& match, const SweepTask& task) const;
   SurfelRegistrationResult search_start(const SweepTask& task, const SurfelPrior& prior, const SweepTwist& twist,
                                         std::size_t needed, const SurfelRegistrationResult& at_rest);
+  void keep_first(const SweepTwist& twist, const Pose& pose, const SweepMotion& sampled);
+  SurfelRegistrationResult redo_start(SweepTwist twist, std::size_t needed, SurfelRegistrationResult result);
 
   Config config_;
   WorkerPool& pool_;
@@ -40,6 +42,16 @@ class SurfelOdometry final : public Pipeline {
   double last_median_ = 0.0;                   // m, residual of the last registration
   std::optional<Vector6d> last_twist_;         // that the last sweep was compensated with
   Vector6d twist_change2_ = Vector6d::Zero();  // mean square of its change from sweep to sweep
+  int twist_changes_ = 0;                      // that are in it; 0: it is not known
+  // The first sweep of the map, until the second one tells its velocity; motion: within it, if it came from outside.
+  struct First {
+    std::vector<Surfel> surfels;
+    SweepMotion motion;
+    SweepTwist sweep;
+    Pose pose = Pose::Identity();
+  };
+  First first_;
+  bool redo_first_ = false;  // no sweep has come since
 };
 
 }  // namespace adit::lidar_odometry

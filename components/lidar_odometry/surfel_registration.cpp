@@ -37,9 +37,10 @@ Vector6d SweepTwist::refined(const Pose& pose, const Vector6d& used) const {
     twist.head<3>() += translation_share / dt * (prediction.inverse() * pose).translation();
     return twist;
   }
-  const Eigen::Vector3d velocity = se3_log(last_middle.inverse() * middle(pose, used)).head<3>() / dt;
-  const Eigen::Vector3d rate = so3_log(last.linear().transpose() * pose.linear()) / dt;
-  twist.head<3>() += translation_share * (velocity - predicted.head<3>());
+  const Vector6d between = se3_log(last_middle.inverse() * middle(pose, used)) / dt;
+  Eigen::Vector3d rate = between.tail<3>();
+  if (!rotation_from_middles) rate = so3_log(last.linear().transpose() * pose.linear()) / dt;
+  twist.head<3>() += translation_share * (between.head<3>() - predicted.head<3>());
   twist.tail<3>() += rotation_share * (rate - predicted.tail<3>());
   return twist;
 }

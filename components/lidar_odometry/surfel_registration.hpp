@@ -30,7 +30,8 @@ struct SurfelPrior {
 // sweeps would feed back: a wrong velocity displaces them, they make the next velocity wrong, and where the evidence
 // lies early in the sweep that recursion does not decay. A wrong velocity leaves the pose at the time of the evidence,
 // half a sweep before the end on average, as it is. Rotations, whose evidence is all around, are taken from end to end:
-// without delay.
+// without delay; not of the first two sweeps, whose twist is one and the same unknown: from end to end its error would
+// come back with the other sign each time.
 struct SweepTwist {
   std::optional<TimeSpan> times;        // nothing: no compensation
   double reference_time = 0.0;          // s after the stamp
@@ -39,6 +40,7 @@ struct SweepTwist {
   Pose last_middle = Pose::Identity();  // in its middle
   Vector6d predicted = Vector6d::Zero();
   double translation_share = 0.0, rotation_share = 0.0;
+  bool rotation_from_middles = false;
   // The motion from outside, e.g. of an IMU; `predicted` then only has its mean velocity, of which the estimate may
   // correct the translation: by how far the pose is from where that motion led.
   const SweepMotion* sampled = nullptr;
