@@ -195,12 +195,6 @@ SurfelRegistrationResult SurfelOdometry::redo_start(SweepTwist twist, std::size_
     prior.pose = result.pose;
     const SurfelRegistrationResult before = result;
     result = registration_.align(surfels_, map_, prior.pose, prior, twist, wide_gate, needed, pool_);
-    fprintf(stderr,
-            "round %d used %.3f %.3f %.3f  %.4f %.4f %.4f -> %.3f %.3f %.3f %.4f %.4f %.4f rms %.4f (%.4f) assoc %d "
-            "matched %zu\n",
-            round, used[0], used[1], used[2], used[3], used[4], used[5], result.twist[0], result.twist[1],
-            result.twist[2], result.twist[3], result.twist[4], result.twist[5], result.rms_residual,
-            before.rms_residual, result.associations, result.matched);
     result.associations += before.associations;
     result.solves += before.solves;
   }
