@@ -116,9 +116,9 @@ Result<std::unique_ptr<BagWriter>> BagWriter::create(const std::string& folder, 
   std::unique_ptr<BagWriter> writer(new BagWriter(std::make_unique<Impl>(path.string(), file_name, *std::move(file))));
   Impl& d = *writer->impl_;
   d.safety = safety;
-  // A write-ahead log that waits for the disk when it is merged: what was committed outlives a power cut. Otherwise
-  // nothing is at stake before close().
-  const std::string mode = safety == Safety::each_commit ? "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"
+  // A write-ahead log that waits for the disk at each commit: only so does what was committed outlive a power cut.
+  // Otherwise nothing is at stake before close().
+  const std::string mode = safety == Safety::each_commit ? "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
                                                          : "PRAGMA synchronous = OFF;";
   if (auto made = d.file.execute(mode + " BEGIN;" + kTables); !made) return made.error();
   if (auto row = d.add_row("INSERT INTO schema VALUES (?, ?)", 4, kDistribution); !row) return row.error();
