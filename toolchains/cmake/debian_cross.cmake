@@ -42,7 +42,7 @@ foreach(_kind EXE SHARED MODULE)
   set(CMAKE_${_kind}_LINKER_FLAGS_INIT "-Wl,-rpath-link,${ADIT_SYSROOT}/usr/lib/${_triple}")
 endforeach()
 
-# Tests run through the emulator; emulate/ says what it lacks.
+# Tests run through the emulator.
 find_program(ADIT_EMULATOR NAMES ${_emulator} ${_emulator}-static)
 if(ADIT_EMULATOR)
   set(CMAKE_CROSSCOMPILING_EMULATOR ${ADIT_EMULATOR};-L;${ADIT_SYSROOT})
