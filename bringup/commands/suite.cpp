@@ -85,7 +85,8 @@ Result<void> run_one(const Arguments& arguments, const std::string& scenario, st
       !written) {
     return written;
   }
-  for (const evaluation::Evaluation& e : evaluated->evaluations) rows.push_back(evaluation::study_row(name, seed, e));
+  for (const evaluation::Evaluation& e : evaluated->evaluations)
+    rows.push_back(evaluation::study_row(name, seed, e, report.outages_ns));
   std::printf("%s seed %llu: %.0f s of data in %.0f s\n", name.c_str(), static_cast<unsigned long long>(seed),
               outcome->simulated_s, outcome->wall_s);
   std::fflush(stdout);

@@ -37,6 +37,23 @@ std::string text(const char* format, double value) {
   return buffer;
 }
 
+// Of each outage the median over the runs and the worst: "0.12 (0.20) 1.30 (1.90)" for two of them.
+std::string outage_cell(const std::vector<const StudyRow*>& group) {
+  std::string out;
+  for (const OutageGrowth& outage : group.front()->outages) {
+    std::vector<double> errors;
+    for (const StudyRow* row : group) {
+      for (const OutageGrowth& o : row->outages) {
+        if (o.from_ns == outage.from_ns && o.to_ns == outage.to_ns) errors.push_back(o.error_m);
+      }
+    }
+    if (!out.empty()) out += " ";
+    out += text("%.2f", *median(errors));
+    if (errors.size() > 1) out += text(" (%.2f)", *std::max_element(errors.begin(), errors.end()));
+  }
+  return out.empty() ? "-" : out;
+}
+
 std::string cell(const std::vector<const StudyRow*>& group, const Column& column) {
   std::vector<double> values;
   for (const StudyRow* row : group) {
@@ -62,7 +79,8 @@ std::optional<double> median(std::vector<double> values) {
   return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
-StudyRow study_row(const std::string& scenario, std::uint64_t seed, const Evaluation& e) {
+StudyRow study_row(const std::string& scenario, std::uint64_t seed, const Evaluation& e,
+                   std::span<const std::pair<std::int64_t, std::int64_t>> outages_ns) {
   StudyRow row;
   row.scenario = scenario;
   row.estimate = e.name;
@@ -76,6 +94,7 @@ StudyRow study_row(const std::string& scenario, std::uint64_t seed, const Evalua
   row.scale = e.scale;
   row.nees = e.nees_mean;
   row.sigma3_coverage = e.sigma3_coverage;
+  row.outages = outage_growth(e, outages_ns);
   row.availability = e.availability;
   row.largest_gap_s = e.largest_gap_s;
   return row;
@@ -95,7 +114,7 @@ std::string print_study(const std::vector<StudyRow>& rows) {
   }
   std::vector<TextRow> table = {{"scenario", "estimate", "runs", "way [m]"}};
   for (const Column& column : kColumns) table[0].emplace_back(column.title);
-  table[0].insert(table[0].end(), {"available [%]", "gap [s]"});
+  table[0].insert(table[0].end(), {"outages [m]", "available [%]", "gap [s]"});
   std::string last;
   for (const auto& group : groups) {
     const StudyRow& first = *group.front();
@@ -109,6 +128,7 @@ std::string print_study(const std::vector<StudyRow>& rows) {
       available = std::min(available, row->availability);
       gap = std::max(gap, row->largest_gap_s);
     }
+    line.push_back(outage_cell(group));
     line.push_back(text("%.1f", 100.0 * available));
     line.push_back(text("%.2f", gap));
   }
@@ -120,6 +140,11 @@ std::string study_json(const std::vector<StudyRow>& rows) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); };
   Json runs = Json::array();
   for (const StudyRow& r : rows) {
+    Json outages = Json::array();
+    for (const OutageGrowth& o : r.outages) {
+      outages.push_back(
+          {{"from_ns", o.from_ns}, {"to_ns", o.to_ns}, {"error_m", o.error_m}, {"distance_m", o.distance_m}});
+    }
     runs.push_back({{"scenario", r.scenario},
                     {"seed", r.seed},
                     {"estimate", r.estimate},
@@ -132,6 +157,7 @@ std::string study_json(const std::vector<StudyRow>& rows) {
                     {"scale", number(r.scale)},
                     {"nees", number(r.nees)},
                     {"sigma3_coverage", number(r.sigma3_coverage)},
+                    {"outages", outages},
                     {"availability", r.availability},
                     {"largest_gap_s", r.largest_gap_s}});
   }

@@ -3,10 +3,13 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bringup/evaluation/evaluation.hpp"
+#include "bringup/evaluation/outage_growth.hpp"
 
 namespace adit::evaluation {
 
@@ -16,10 +19,12 @@ struct StudyRow {
   std::uint64_t seed = 0;
   double distance_m = 0.0;
   std::optional<double> drift_percent, axial_percent, lateral_end_m, yaw_end_deg, ate_m, scale, nees, sigma3_coverage;
+  std::vector<OutageGrowth> outages;
   double availability = 0.0, largest_gap_s = 0.0;
 };
 
-StudyRow study_row(const std::string& scenario, std::uint64_t seed, const Evaluation& evaluation);
+StudyRow study_row(const std::string& scenario, std::uint64_t seed, const Evaluation& evaluation,
+                   std::span<const std::pair<std::int64_t, std::int64_t>> outages_ns = {});
 
 // One row a scenario and estimate, in the order they come: medians over the seeds, the worst in brackets where it
 // matters.
