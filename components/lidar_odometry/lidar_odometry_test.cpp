@@ -257,6 +257,33 @@ TEST_P(EachMode, StartsAnewAfterAnotherPlaceAltogether) {
   EXPECT_TRUE(registered(odometry.estimate().status));
 }
 
+// Three seconds without a sweep, in which the vehicle drove on: nobody knows how far.
+TEST(Default, AfterAPauseItGoesOnFromWhereItWas) {
+  constexpr double speed = 1.0;
+  Vector6d twist = Vector6d::Zero();
+  twist[0] = speed;
+  const auto sweep = [&](int k) {
+    Pose end = Pose::Identity();
+    end.translation().x() = 0.1 * speed * k;
+    return scan(hall(), {}, end, twist, k * period_ns, static_cast<unsigned>(k + 1));
+  };
+  LidarOdometry odometry(config_of(Mode::default_));
+  for (int k = 0; k < 20; ++k) odometry.process(sweep(k).cloud());
+  const Pose before = odometry.estimate().pose;
+  EXPECT_EQ(odometry.process(sweep(50).cloud()).status, Status::initialising);
+  EXPECT_LT(distance(odometry.estimate().pose, before), 1e-9);
+  Pose last = odometry.estimate().pose;
+  for (int k = 51; k < 60; ++k) {
+    const Estimate& e = odometry.process(sweep(k).cloud());
+    ASSERT_TRUE(sane(e));
+    EXPECT_EQ(e.status, Status::ok) << k;
+    if (k > 52) {
+      EXPECT_NEAR((last.inverse() * e.pose).translation().x(), 0.1 * speed, 0.02) << k;
+    }
+    last = e.pose;
+  }
+}
+
 TEST_P(EachMode, UsesThePriorForLargeStepsAndIgnoresABrokenOne) {
   // Every sixth sweep of a fast drive, without point times: 0.6 m and 3.4 degrees between sweeps, from rest.
   ScannerModel model;

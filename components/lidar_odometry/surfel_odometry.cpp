@@ -212,6 +212,9 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     redo_first_ = false;
     return;
   }
+  // After a pause without a prior nobody knows where in the map the sensor is, and one stretch of a tunnel looks like
+  // another.
+  if (task.dt > config_.max_gap_s && !task.external) reset();
   const SweepTwist twist = twist_of(task);
   if (map_.empty()) {
     estimate.status = Status::initialising;
