@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "adit_msgs/msg/localizability.hpp"
 #include "components/runtime/offline_runner.hpp"
 #include "components/runtime/stamp.hpp"
 
@@ -52,6 +53,18 @@ Recording SyntheticDrive::record() const {
   };
   if (lidar) play("/lidar", 100ms, 70ms, change_lidar);
   if (thermal) play("/thermal", 40ms, 15ms, change_thermal);
+  for (int i = 0; lidar_matches && i * 100ms <= length; ++i) {
+    auto message = std::make_shared<adit_msgs::msg::Localizability>();
+    message->header.stamp = to_stamp(Time(begin + i * 100ms));
+    message->correspondences = lidar_matches(0.1 * i);
+    recording.add("/localizability", Time(begin + i * 100ms + 65ms), std::move(message));
+  }
+  for (int i = 0; thermal_health && i * 40ms <= length; ++i) {
+    auto message = std::make_shared<adit_msgs::msg::ThermalHealth>();
+    message->header.stamp = to_stamp(Time(begin + i * 40ms));
+    thermal_health(*message, 0.04 * i);
+    recording.add("/thermal_health", Time(begin + i * 40ms + 14ms), std::move(message));
+  }
   for (int i = 0; fix && i * 200ms <= length; ++i) {
     sensor_msgs::msg::NavSatFix message;
     message.header.stamp = to_stamp(Time(begin + i * 200ms));

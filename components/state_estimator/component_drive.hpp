@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "adit_msgs/msg/fusion_status.hpp"
+#include "adit_msgs/msg/thermal_health.hpp"
 #include "components/geometry/se3.hpp"
 #include "components/runtime/component_config.hpp"
 #include "components/runtime/testing/recording.hpp"
@@ -40,6 +41,9 @@ struct SyntheticDrive {
   Change change_lidar = nullptr;
   Change change_thermal = nullptr;
   std::function<void(sensor_msgs::msg::NavSatFix&, double t)> fix = nullptr;  // 5 Hz where set
+  // What the front ends say of themselves, where set: matched points of a sweep, state and ln(scale) deviation.
+  std::function<unsigned(double t)> lidar_matches = nullptr;
+  std::function<void(adit_msgs::msg::ThermalHealth&, double t)> thermal_health = nullptr;
 
   Recording record() const;
 };

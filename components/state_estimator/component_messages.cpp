@@ -32,14 +32,16 @@ void fill(const SensorReport& report, const Arrival& arrival, const Config& conf
           SensorStatus& out) {
   const bool arrives = arrival.last_ns != kNoStamp && seconds_between(arrival.last_ns, now) <= config.outage_s;
   out.name = report.name;
-  out.health = !arrives            ? SensorStatus::ABSENT
-               : report.distrusted ? SensorStatus::FAULTY
-               : report.healthy    ? SensorStatus::HEALTHY
-                                   : SensorStatus::DEGRADED;
+  const bool doubtful = report.suspicion >= 0.5;
+  out.health = !arrives                      ? SensorStatus::ABSENT
+               : report.distrusted           ? SensorStatus::FAULTY
+               : report.healthy && !doubtful ? SensorStatus::HEALTHY
+                                             : SensorStatus::DEGRADED;
   out.reason = !arrives            ? "no data"
                : report.distrusted ? "contradicted by another sensor"
-               : report.healthy    ? ""
-                                   : "its data is not fused";
+               : !report.healthy   ? "its data is not fused"
+               : doubtful          ? "in doubt by its own account"
+                                   : "";
   out.age = report.age_s;
   out.nis = report.nis;
   out.nis_mean = report.mean_nis_per_dof;

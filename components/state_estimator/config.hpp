@@ -26,8 +26,8 @@ struct ImuSensor {
   bool enabled = false;
   Pose body_from_sensor = Pose::Identity();
   bool use_acceleration = true;
-  double sigma_yaw_rate = 0.01;                          // rad/s, one sample
-  double sigma_acceleration = 0.4;                       // m/s^2, one sample: vibration and tilt error included
+  double sigma_yaw_rate = 0.01;     // rad/s, one sample
+  double sigma_acceleration = 0.4;  // m/s^2, one sample: levelling error; the scatter of the last samples is added
   double max_yaw_rate = 20.0, max_acceleration = 160.0;  // beyond: not a measurement
   double yaw_rate_bias = 0.01, acceleration_bias = 0.1;  // initial deviations
   Tilt::Config tilt;

@@ -6,6 +6,29 @@
 #include "components/state_estimator/correction.hpp"
 
 namespace adit::state_estimator {
+namespace {
+
+// A front end's own account of its scale. What its variance grows by, the scale has drifted since. When it falls, the
+// lengths were measured anew (LiDAR depth): the scale is then as at the start and has nothing to do with the one
+// before.
+void follow_scale(FilterState& state, SensorState& sensor, double told, double start_sigma) {
+  constexpr double fallen = 0.9;  // less is rounding
+  const double last = sensor.log_scale_sigma;
+  sensor.log_scale_sigma = told;
+  sensor.least_log_scale_sigma = last > 0.0 ? std::min(sensor.least_log_scale_sigma, told) : told;
+  double& variance = state.p(kScale, kScale);
+  if (last <= 0.0 || variance <= 0.0) return;
+  if (told < fallen * last) {
+    state.x(kScale) = 0.0;
+    state.p.row(kScale).setZero();
+    state.p.col(kScale).setZero();
+    variance = start_sigma * start_sigma + told * told - sensor.least_log_scale_sigma * sensor.least_log_scale_sigma;
+  } else if (told > last) {
+    variance += told * told - last * last;
+  }
+}
+
+}  // namespace
 
 int Filter::add_sensor(SensorModel sensor) {
   if (count_ == kMaxSensors) return -1;
@@ -22,6 +45,7 @@ void Filter::apply(FilterState& state, const Measurement& m) const {
     return;
   }
   statistics.last_received_ns = m.stamp_ns;
+  if (sensor.scaled && m.log_scale_sigma > 0.0) follow_scale(state, statistics, m.log_scale_sigma, scale_sigma);
   if (sensor.moves) {
     const double scale = sensor.scaled ? std::exp(state.x(kScale)) : 1.0;
     observe_motion(state, m.sensor, m.stamp_ns, m.motion, scale, disagreement);
@@ -67,7 +91,8 @@ bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel
   ++statistics.examined;
   statistics.nis_per_dof_sum += nis / m.rows;
   const bool moving = std::abs(state.x(kSpeed)) > 0.1 || std::abs(state.x(kYawRate)) > 0.03;
-  if (disagreement.enabled && (statistics.is_distrusted || (m.motion.frozen && moving))) {
+  const bool disbelieved = m.motion.suspicion >= 1.0;  // by its own front end
+  if (disagreement.enabled && (statistics.is_distrusted || disbelieved || (m.motion.frozen && moving))) {
     ++statistics.distrusted;
     return false;
   }

@@ -44,6 +44,7 @@ class Filter {
   GateConfig gate;
   DisagreementConfig disagreement;
   NoiseAdaptationConfig adaptation;
+  double scale_sigma = 0.1;  // of ln(scale) when a scaled sensor has measured its lengths anew
 
   // Index of the new sensor, or -1 when there are kMaxSensors already.
   int add_sensor(SensorModel sensor);

@@ -56,6 +56,42 @@ class TwoSensors : public testing::Test {
   std::normal_distribution<double> normal_;
 };
 
+// A sensor with a scale, beside it one that measures true lengths: the scale is known before it drifts.
+TEST(FrontEndScale, DriftsByItsOwnAccountAndStartsAnewWhenMeasuredAnew) {
+  Filter filter;
+  filter.scale_sigma = 0.01;
+  SensorModel model;
+  model.model = std::make_unique<SpeedAndYawRate>(OdometryCalibration{.scale = true, .yaw_bias = false});
+  model.moves = model.scaled = true;
+  filter.add_sensor(std::move(model));
+  FilterState state;
+  state.stamp_ns = 0;
+  state.x(kSpeed) = 5.0;
+  state.x(kScale) = 0.02;
+  state.p.diagonal().head<kCoreStates>().setConstant(1e-6);
+  state.p(kScale, kScale) = 1e-6;
+  filter.process.noise.scale = 0.0;
+  const auto say = [&](double log_scale_sigma) {
+    Measurement m = test::rates(0, state.stamp_ns + kMillisecond, 5.0, 0.0, 0.1, 0.01);
+    m.rows = 0;  // nothing but its account
+    m.log_scale_sigma = log_scale_sigma;
+    filter.apply(state, m);
+  };
+  say(0.004);
+  say(0.004);
+  EXPECT_DOUBLE_EQ(state.p(kScale, kScale), 1e-6);
+  say(0.010);
+  say(0.020);
+  EXPECT_NEAR(state.p(kScale, kScale), 1e-6 + 0.020 * 0.020 - 0.004 * 0.004, 1e-12);
+  EXPECT_DOUBLE_EQ(state.x(kScale), 0.02);
+  state.p(kScale, kX) = state.p(kX, kScale) = 1e-7;
+  say(0.004);
+  EXPECT_DOUBLE_EQ(state.x(kScale), 0.0);
+  EXPECT_DOUBLE_EQ(state.p(kScale, kScale), 1e-4);
+  EXPECT_DOUBLE_EQ(state.p(kScale, kX), 0.0);
+  EXPECT_DOUBLE_EQ(state.p(kX, kScale), 0.0);
+}
+
 const auto kFive = [](double) { return 5.0; };
 const auto kZero = [](double) { return 0.0; };
 

@@ -1,8 +1,10 @@
 #include "components/state_estimator/imu_input.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "components/geometry/se3.hpp"
+#include "components/state_estimator/odometry_track.hpp"
 
 namespace adit::state_estimator {
 
@@ -34,6 +36,19 @@ Eigen::Matrix3d Tilt::level() const {
   rows.row(2) = up_.transpose();
   rows.row(1) = up_.cross(ahead.normalized()).transpose();
   return rows;
+}
+
+void OdomTilt::observe(double heading, const Eigen::Matrix3d& in_odom, const Eigen::Matrix3d& by_gravity) {
+  constexpr int most = 50;
+  observed_ = std::min(observed_ + 1, most);
+  const Eigen::Matrix3d turn = so3_exp({0.0, 0.0, heading});
+  const Eigen::Matrix3d seen = turn * in_odom * by_gravity.transpose() * turn.transpose();
+  const Eigen::Vector3d apart = so3_log(odom_from_gravity_.transpose() * seen);
+  odom_from_gravity_ = odom_from_gravity_ * so3_exp(apart / observed_);
+}
+
+Eigen::Matrix3d OdomTilt::in_odom(double heading, const Eigen::Matrix3d& by_gravity) const {
+  return level_of(odom_from_gravity_ * so3_exp({0.0, 0.0, heading}) * by_gravity);
 }
 
 void StandstillDetector::update(std::int64_t stamp_ns, const Eigen::Vector3d& gyro, const Eigen::Vector3d& force) {

@@ -37,6 +37,21 @@ class Tilt {
   Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ();  // the vertical in body axes
 };
 
+// How odom, which is level as the body was at its start, lies to gravity: makes the IMU's roll and pitch those in odom,
+// so that they go on where an odometry's stop.
+class OdomTilt {
+ public:
+  // The body's axes to axes of its `heading` [rad] that are level in odom, and to those that are level by gravity, at
+  // one instant: averaged over the last 50.
+  void observe(double heading, const Eigen::Matrix3d& in_odom, const Eigen::Matrix3d& by_gravity);
+  bool ready() const { return observed_ > 0; }
+  Eigen::Matrix3d in_odom(double heading, const Eigen::Matrix3d& by_gravity) const;
+
+ private:
+  Eigen::Matrix3d odom_from_gravity_ = Eigen::Matrix3d::Identity();
+  int observed_ = 0;
+};
+
 // Stands still when angular rate and specific force stay constant for a while.
 class StandstillDetector {
  public:
@@ -52,6 +67,8 @@ class StandstillDetector {
 
   void update(std::int64_t stamp_ns, const Eigen::Vector3d& gyro, const Eigen::Vector3d& force);
   bool stands() const { return stands_; }
+  // Scatter of the specific force about its recent mean, variance of one axis [(m/s^2)^2]: vibration, steps.
+  double force_variance() const { return force_variance_; }
 
  private:
   Config config_;

@@ -55,6 +55,24 @@ TEST(Tilt, FreeFallShocksAndGapsDoNoHarm) {
   EXPECT_LT((tilt.level() - so3_exp({0.0, 0.1, 0.0})).norm(), 1e-9);
 }
 
+TEST(OdomTilt, RollAndPitchGoOnInOdomWhateverTheHeading) {
+  // odom is tilted against gravity; the body turns in it and rolls.
+  const Eigen::Matrix3d gravity_from_odom = so3_exp({0.03, -0.05, 0.0});
+  const auto by_gravity = [&](double heading, const Eigen::Matrix3d& in_odom) {
+    const Eigen::Matrix3d turn = so3_exp({0.0, 0.0, heading});
+    return Eigen::Matrix3d(turn.transpose() * gravity_from_odom * turn * in_odom);
+  };
+  OdomTilt tilt;
+  EXPECT_FALSE(tilt.ready());
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Matrix3d rolled = so3_exp({0.01 * std::sin(0.3 * i), 0.0, 0.0});
+    tilt.observe(0.02 * i, rolled, by_gravity(0.02 * i, rolled));
+  }
+  EXPECT_TRUE(tilt.ready());
+  const Eigen::Matrix3d pitched = so3_exp({0.0, 0.04, 0.0});
+  EXPECT_LT((tilt.in_odom(-1.5, by_gravity(-1.5, pitched)) - pitched).norm(), 1e-3);
+}
+
 class Standstill : public testing::Test {
  protected:
   void feed(double duration, double gyro_sigma, double force_sigma, const Eigen::Vector3d& turn) {

@@ -33,6 +33,7 @@ struct Measurement {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
   Eigen::Matrix3d projection = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  double log_scale_sigma = 0.0;  // of a scaled sensor's lengths, by its own account; 0: not told
   Motion motion;
 };
 

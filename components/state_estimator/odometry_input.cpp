@@ -103,7 +103,8 @@ void keep_rates(const Eigen::Vector2d& variances, const Eigen::Vector2d& limits,
 Conversion to_measurement(const RelativeMotion& input, const OdometryConfig& config, std::uint8_t sensor,
                           Measurement& out) {
   const double span = seconds_between(input.from_ns, input.to_ns);
-  if (!input.motion.matrix().allFinite() || !input.level.allFinite() || !std::isfinite(input.suspicion)) {
+  if (!input.motion.matrix().allFinite() || !input.level.allFinite() || !std::isfinite(input.suspicion) ||
+      !std::isfinite(input.log_scale_sigma.value_or(0.0))) {
     return Conversion::not_finite;
   }
   if ((input.motion.linear() * input.motion.linear().transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-3) {
@@ -135,6 +136,7 @@ Conversion to_measurement(const RelativeMotion& input, const OdometryConfig& con
 
   out = Measurement{};
   out.sensor = sensor;
+  out.log_scale_sigma = std::clamp(input.log_scale_sigma.value_or(0.0), 0.0, 1.0);
   const double jitter = square(config.stamp_jitter_s / span);
   Eigen::Vector2d rate_variance(square(config.sigma_speed) + square(config.speed_fraction * speed),
                                 square(config.sigma_yaw_rate));

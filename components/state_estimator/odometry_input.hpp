@@ -22,6 +22,7 @@ struct RelativeMotion {
   // Rotates body axes at `from` to levelled axes of the same heading; identity when roll and pitch are unknown.
   Eigen::Matrix3d level = Eigen::Matrix3d::Identity();
   double suspicion = 0.0;  // the front end's own doubt, 0 to 1 (smoke, saturation, few features)
+  std::optional<double> log_scale_sigma;
 };
 
 struct OdometryConfig {
@@ -41,7 +42,8 @@ struct OdometryConfig {
   double stamp_jitter_s = 0.0;                           // of the difference of the two stamps
   double max_interval_s = 0.5;                           // longer intervals are gaps
   double max_speed = 60.0, max_yaw_rate = 6.0;           // beyond: not a motion but a jump
-  // Relative poses keep their anchor this long, so that errors of scan-to-map poses telescope; 0: consecutive poses.
+  // Relative poses keep their anchor this long while nothing speaks against the sensor, so that errors of scan-to-map
+  // poses telescope; 0: consecutive poses.
   double anchor_period_s = 0.0;
 };
 

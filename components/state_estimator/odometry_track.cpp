@@ -19,6 +19,7 @@ RelativeMotion OdometryTrack::motion(const OdometrySample& from, const OdometryS
   motion.motion = from.pose.inverse() * to.pose;
   motion.information = to.information;
   motion.suspicion = to.suspicion;
+  motion.log_scale_sigma = to.log_scale_sigma;
   if (config_.level) {
     motion.level = level_of(from.pose.linear() * config_.odometry.body_from_sensor.linear().transpose());
   } else if (level) {
@@ -54,9 +55,9 @@ Verdict OdometryTrack::follow(const OdometrySample& sample, const std::optional<
   return Verdict::fused;
 }
 
-void OdometryTrack::accept(const OdometrySample& sample, Verdict verdict) {
+void OdometryTrack::accept(const OdometrySample& sample, Verdict verdict, bool trusted) {
   previous_ = sample;
-  const bool keep = config_.odometry.anchor_period_s > 0.0 && verdict == Verdict::fused &&
+  const bool keep = config_.odometry.anchor_period_s > 0.0 && verdict == Verdict::fused && trusted &&
                     seconds_between(anchor_->stamp_ns, sample.stamp_ns) < config_.odometry.anchor_period_s;
   if (!keep) anchor_ = sample;
 }

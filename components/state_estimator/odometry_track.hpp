@@ -17,8 +17,9 @@ class OdometryTrack {
   // accept() is told of it. Everything else: the sample is not used, or (first, gap, jump) the next one starts from it.
   // `level`: body axes to levelled ones by the IMU, for odometries whose own frame is not level.
   Verdict follow(const OdometrySample& sample, const std::optional<Eigen::Matrix3d>& level, Measurement& out);
-  // What became of the last measurement of follow(): the next one starts from its sample, or from the anchor still.
-  void accept(const OdometrySample& sample, Verdict verdict);
+  // What became of the last measurement of follow(): the next one starts from its sample, or, when it is `trusted`,
+  // from the anchor still.
+  void accept(const OdometrySample& sample, Verdict verdict, bool trusted);
   void restart() { anchor_ = previous_ = std::nullopt; }
 
   const OdometrySensor& config() const { return config_; }

@@ -31,7 +31,8 @@ struct OdometrySample {
   // perturbation [rho; theta]; nothing: configured deviations.
   std::optional<Matrix6d> information;
   std::uint64_t frame = 0;  // another value: the odometry's frame is a new one (restart, re-initialization)
-  double suspicion = 0.0;
+  double suspicion = 0.0;   // the front end's own doubt, 0 none to 1 certain
+  std::optional<double> log_scale_sigma;  // the front end's own deviation of ln(scale), where it has one
 };
 
 struct ImuSample {

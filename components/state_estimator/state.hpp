@@ -71,6 +71,7 @@ struct SensorState {
   double nis_per_dof_sum = 0.0;  // over all examined ones: the mean should be 1
   std::uint64_t examined = 0;
   bool is_distrusted = false;
+  double log_scale_sigma = 0.0, least_log_scale_sigma = 0.0;  // of its lengths by its own account: last, least; 0: none
   NoiseAdaptation noise;
   MotionWindow window;
 };

@@ -30,6 +30,7 @@ StateEstimator::StateEstimator(const Config& config)
   filter_.gate = config.gate;
   filter_.disagreement = config.disagreement;
   filter_.adaptation = config.adaptation;
+  filter_.scale_sigma = config.initial.sigma_scale;
   int slot = 0;
   for (const OdometrySensor& o : config.odometries) {
     SensorModel model;
@@ -211,7 +212,10 @@ Verdict StateEstimator::add_odometry(int sensor, const OdometrySample& sample, s
   if (verdict != Verdict::fused) return count(sensor, verdict);
   verdict = insert(m, now_ns);
   if (verdict == Verdict::fused) carry_attitude(track, track.previous_pose(), sample);
-  track.accept(sample, verdict);
+  const FilterState& head = replay_.head();
+  const SensorState& statistics = head.sensors[static_cast<std::size_t>(sensor)];
+  const bool whole = m.rows == kMaxRows && !head.conflict;  // every direction known, nobody contradicts
+  track.accept(sample, verdict, whole && !statistics.is_distrusted && statistics.consecutive_rejections == 0);
   if (verdict == Verdict::fused) maybe_stand_still(m.stamp_ns, now_ns);
   return count(sensor, verdict);
 }
@@ -230,13 +234,15 @@ Verdict StateEstimator::add_imu(const ImuSample& sample, std::int64_t now_ns) {
   tilt_.update(sample.stamp_ns, gyro, force, x(kAccel), x(kSpeed) * x(kYawRate));
   standstill_.update(sample.stamp_ns, gyro, force);
   if (!tilt_.ready()) return Verdict::first;
+  if (!odom_tilt_.ready()) odom_tilt_.observe(x(kYaw), tilt_from_odometry_, tilt_.level());
   const Eigen::Matrix3d level = tilt_.level();
   Measurement m;
   m.sensor = static_cast<std::uint8_t>(imu_);
   m.stamp_ns = sample.stamp_ns;
   m.rows = config.use_acceleration ? 2 : 1;
   m.value << level.row(2).dot(gyro), level.row(0).dot(force), 0.0;
-  m.covariance = Eigen::Vector3d(square(config.sigma_yaw_rate), square(config.sigma_acceleration), 1.0).asDiagonal();
+  const double acceleration = square(config.sigma_acceleration) + standstill_.force_variance();
+  m.covariance = Eigen::Vector3d(square(config.sigma_yaw_rate), acceleration, 1.0).asDiagonal();
   const Verdict verdict = insert(m, now_ns);
   if (verdict == Verdict::fused) maybe_stand_still(sample.stamp_ns, now_ns);
   return count(imu_, verdict);
@@ -295,6 +301,7 @@ void StateEstimator::carry_attitude(const OdometryTrack& track, const Pose& from
   const Pose sensor_from_body = track.config().odometry.body_from_sensor.inverse();
   height_ += (to.pose * sensor_from_body).translation().z() - (from * sensor_from_body).translation().z();
   tilt_from_odometry_ = level_of((to.pose * sensor_from_body).linear());
+  if (tilt_.ready()) odom_tilt_.observe(replay_.head().x(kYaw), tilt_from_odometry_, tilt_.level());
   height_from_ = index;
   height_ns_ = to.stamp_ns;
 }
@@ -325,7 +332,8 @@ Estimate StateEstimator::estimate_of(const FilterState& state) const {
   // An odometry's roll and pitch are smoother than the IMU's, which shakes with the body; without one, the IMU's.
   const bool from_odometry =
       height_ns_ != kNoStamp && seconds_between(height_ns_, state.stamp_ns) < 2.0 * config_.outage_s;
-  return to_estimate(state, height_, tilt_.ready() && !from_odometry ? tilt_.level() : tilt_from_odometry_);
+  const bool from_imu = tilt_.ready() && !from_odometry;
+  return to_estimate(state, height_, from_imu ? odom_tilt_.in_odom(state.x(kYaw), tilt_.level()) : tilt_from_odometry_);
 }
 
 std::optional<Estimate> StateEstimator::estimate(std::int64_t stamp_ns) const {

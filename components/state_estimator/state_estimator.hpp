@@ -94,6 +94,7 @@ class StateEstimator {
   int height_from_ = -1;
   std::int64_t height_ns_ = kNoStamp;
   Eigen::Matrix3d tilt_from_odometry_ = Eigen::Matrix3d::Identity();
+  OdomTilt odom_tilt_;
 };
 
 }  // namespace adit::state_estimator

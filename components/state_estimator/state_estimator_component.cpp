@@ -6,10 +6,13 @@
 #include <memory>
 
 #include "adit_msgs/msg/fusion_status.hpp"
+#include "adit_msgs/msg/localizability.hpp"
+#include "adit_msgs/msg/thermal_health.hpp"
 #include "components/geometry/rigid.hpp"
 #include "components/runtime/component.hpp"
 #include "components/runtime/stamp.hpp"
 #include "components/state_estimator/component_messages.hpp"
+#include "components/state_estimator/front_end_doubt.hpp"
 #include "components/state_estimator/gnss_frame.hpp"
 #include "components/state_estimator/state_estimator.hpp"
 #include "nav_msgs/msg/odometry.hpp"
@@ -21,6 +24,8 @@ namespace adit {
 namespace {
 
 using adit_msgs::msg::FusionStatus;
+using adit_msgs::msg::Localizability;
+using adit_msgs::msg::ThermalHealth;
 using nav_msgs::msg::Odometry;
 using sensor_msgs::msg::Imu;
 using sensor_msgs::msg::NavSatFix;
@@ -91,15 +96,15 @@ class StateEstimatorComponent final : public Component {
       Unit::second, Range{0.0, 10.0},      "LiDAR poses are fused relative to one this old; 0: to the one before"};
   Param<double> lidar_position_floor_{*this,
                                       "lidar_position_floor",
-                                      0.01,
+                                      1e-5,
                                       Unit::metre,
                                       Range{1e-5, 10.0},
                                       "deviation of one LiDAR pose below which no reported covariance is believed"};
-  Param<double> lidar_yaw_floor_{*this,        "lidar_yaw_floor", 2e-4,
+  Param<double> lidar_yaw_floor_{*this,        "lidar_yaw_floor", 1e-5,
                                  Unit::radian, Range{1e-6, 1.0},  "the same of its heading"};
-  Param<double> thermal_position_floor_{*this,       "thermal_position_floor", 0.01,
+  Param<double> thermal_position_floor_{*this,       "thermal_position_floor", 1e-5,
                                         Unit::metre, Range{1e-5, 10.0},        "the same of the thermal odometry"};
-  Param<double> thermal_yaw_floor_{*this,        "thermal_yaw_floor", 5e-4,
+  Param<double> thermal_yaw_floor_{*this,        "thermal_yaw_floor", 1e-5,
                                    Unit::radian, Range{1e-6, 1.0},    "the same of its heading"};
   Param<Numbers> initial_pose_{*this, "initial_pose", Numbers{0, 0, 0}, "in odom_frame: x y [m], heading [rad]"};
   Param<Numbers> initial_pose_sigma_{*this,
@@ -128,6 +133,16 @@ class StateEstimatorComponent final : public Component {
                          [this](const Odometry& message, const MessageInfo&) { on_odometry(0, message); }};
   Input<Odometry> thermal_{*this, "thermal", Qos::reliable(10), Queue{30, WhenFull::drop_oldest},
                            [this](const Odometry& message, const MessageInfo&) { on_odometry(1, message); }};
+  Input<Localizability> localizability_{
+      *this, "localizability", Qos::reliable(10), Queue{10, WhenFull::drop_oldest},
+      [this](const Localizability& message, const MessageInfo&) { lidar_doubt_.update(message); }};
+  Input<ThermalHealth> thermal_health_{*this, "thermal_health", Qos::reliable(10), Queue{30, WhenFull::drop_oldest},
+                                       [this](const ThermalHealth& message, const MessageInfo&) {
+                                         thermal_doubt_ = state_estimator::doubt_of(message);
+                                         const bool known = std::isfinite(message.scale_sigma);
+                                         thermal_log_scale_sigma_.reset();
+                                         if (known) thermal_log_scale_sigma_ = message.scale_sigma;
+                                       }};
   Input<Imu> imu_{*this, "imu", Qos::sensor(), Queue{200, WhenFull::drop_oldest},
                   [this](const Imu& message, const MessageInfo&) { on_imu(message); }};
   Input<NavSatFix> fix_{*this, "fix", Qos::sensor(), Queue{20, WhenFull::drop_oldest},
@@ -138,6 +153,9 @@ class StateEstimatorComponent final : public Component {
   std::unique_ptr<StateEstimator> estimator_;
   std::array<Pose, 2> odometry_axes_;
   state_estimator::Arrivals arrivals_;
+  state_estimator::LidarDoubt lidar_doubt_;
+  state_estimator::Doubt thermal_doubt_;
+  std::optional<double> thermal_log_scale_sigma_;  // of the frame before or this one
   std::optional<state_estimator::Geodetic> geodetic_origin_;
   std::optional<state_estimator::GnssFrame> gnss_frame_;
   std::int64_t last_output_ns_ = state_estimator::kNoStamp;
@@ -237,6 +255,9 @@ Result<void> StateEstimatorComponent::activate() {
   if (!made) return made.error();
   estimator_ = std::move(*made);
   arrivals_ = {};
+  lidar_doubt_ = {};
+  thermal_doubt_ = {};
+  thermal_log_scale_sigma_.reset();
   gnss_frame_.emplace(state_estimator::GnssFrame::Config{.baseline_m = gnss_baseline_});
   last_output_ns_ = state_estimator::kNoStamp;
   distance_ = 0.0;
@@ -266,6 +287,8 @@ void StateEstimatorComponent::on_odometry(int sensor, const Odometry& message) {
   sample.frame = std::hash<std::string>{}(message.header.frame_id);
   const bool use_covariance = sensor == 0 ? lidar_covariance_ : thermal_covariance_;
   if (use_covariance && unit) sample.information = state_estimator::reported_information(message, pose.linear());
+  sample.suspicion = (sensor == 0 ? lidar_doubt_.doubt() : thermal_doubt_).at(sample.stamp_ns);
+  if (sensor == 1) sample.log_scale_sigma = thermal_log_scale_sigma_;
   const std::int64_t head = estimator_->state().stamp_ns;
   note(index, sample.stamp_ns, head, estimator_->add_odometry(sensor, sample, nanoseconds(clock().now())));
 }

@@ -42,6 +42,45 @@ TEST(StateEstimatorComponent, FusesBothIntoPoseTransformAndStatus) {
   EXPECT_EQ(out.bytes, run({}).bytes);
 }
 
+TEST(StateEstimatorComponent, CarriesTheFrontEndsDoubtsOfThemselves) {
+  SyntheticDrive drive;
+  drive.lidar_matches = [](double t) { return t < 5.0 ? 8000U : 900U; };  // smoke
+  drive.thermal_health = [](adit_msgs::msg::ThermalHealth& m, double t) {
+    m.scale_sigma = static_cast<float>(0.004 + (t < 8.0 ? 0.002 : 0.004) * std::max(0.0, t - 5.0));
+  };
+  const Outcome out = run(drive, {{"thermal_scale_sigma", 0.003}});
+  expect_continuous(out, 999);
+  EXPECT_LT(error(out), 0.05);
+  EXPECT_EQ(out.sensor("lidar").health, SensorStatus::DEGRADED);
+  EXPECT_EQ(out.sensor("lidar").reason, "in doubt by its own account");
+  EXPECT_EQ(out.sensor("thermal").health, SensorStatus::HEALTHY);
+  const auto scale_sigma = [&](double t) {
+    return out.status[static_cast<std::size_t>(100.0 * t)].thermal_scale_sigma;
+  };
+  EXPECT_LE(scale_sigma(4.9), 0.0031);
+  EXPECT_GT(scale_sigma(9.9), scale_sigma(4.9));
+
+  drive.lidar_matches = nullptr;
+  drive.thermal_health = [](adit_msgs::msg::ThermalHealth& m, double) {
+    m.flags = adit_msgs::msg::ThermalHealth::FLAG_SATURATED;
+    m.scale_sigma = std::nanf("");  // no account of the scale, and no harm
+  };
+  const Outcome saturated = run(drive);
+  EXPECT_LT(error(saturated), 0.05);
+  EXPECT_EQ(saturated.sensor("thermal").reason, "in doubt by its own account");
+  EXPECT_EQ(saturated.sensor("lidar").reason, "");
+
+  drive.thermal_health = [](adit_msgs::msg::ThermalHealth& m, double t) { m.residual_rms = t < 5.0 ? 0.5F : 3.0F; };
+  drive.change_thermal = [](Odometry& message, Duration&, int i) {
+    if (i > 126) message.pose.pose.position.x -= 0.1 * (i - 126);  // what it aligned wrongly
+  };
+  drive.lidar = false;
+  drive.length = 6s;
+  const Outcome misfit = run(drive);
+  EXPECT_LT(error(misfit), 0.6);  // a second of coasting along the arc; fused, it would be 2.5 m
+  EXPECT_EQ(misfit.sensor("thermal").reason, "its data is not fused");
+}
+
 // The LiDAR looks along a featureless tunnel: its odometry sees half the speed, and its covariance says so. Its own
 // frame is turned by 90 degrees, so that the direction is only right when the covariance is turned into the body.
 TEST(StateEstimatorComponent, ADirectionReportedAsUnknownIsNotUsed) {

@@ -30,6 +30,8 @@ SensorReport report_of(const std::string& name, const SensorState& s, std::int64
   r.nis_dof = s.nis_dof;
   r.mean_nis_per_dof = s.examined > 0 ? s.nis_per_dof_sum / static_cast<double>(s.examined) : 0.0;
   r.noise_factor = s.noise.factor;
+  const bool recent = s.window.stamp_ns != kNoStamp && seconds_between(s.window.stamp_ns, now_ns) <= outage_s;
+  r.suspicion = recent ? s.window.suspicion : 0.0;
   r.accepted = s.accepted;
   r.rejected = s.rejected;
   r.distrusted_count = s.distrusted;

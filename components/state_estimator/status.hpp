@@ -20,6 +20,7 @@ struct SensorReport {
   double nis = 0.0;           // of the last examined measurement,
   int nis_dof = 0;            // with so many rows
   double noise_factor = 1.0;  // on its covariance, found by its innovations
+  double suspicion = 0.0;     // its front end's own doubt, recent mean: 0 none to 1 certain
   double mean_nis_per_dof = 0.0;
   std::uint64_t accepted = 0, rejected = 0, distrusted_count = 0, unanchored = 0, uninformative = 0, forced = 0;
   std::uint64_t too_old = 0, duplicates = 0, future = 0, malformed = 0, gaps = 0, jumps = 0;

@@ -1,0 +1,38 @@
+#include "components/state_estimator/front_end_doubt.hpp"
+
+#include <algorithm>
+
+#include "adit_msgs/msg/localizability.hpp"
+#include "adit_msgs/msg/thermal_health.hpp"
+#include "components/runtime/stamp.hpp"
+
+namespace adit::state_estimator {
+
+using adit_msgs::msg::Localizability;
+using adit_msgs::msg::ThermalHealth;
+
+void LidarDoubt::update(const Localizability& message) {
+  constexpr double forgotten = 0.998;  // a sweep: half of it after 35 s at 10 Hz, when the tunnel has become another
+  const double matched = message.correspondences;
+  usual_ = std::max(matched, forgotten * usual_);
+  doubt_.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
+  doubt_.value = usual_ > 0.0 ? std::clamp(1.0 - 2.0 * matched / usual_, 0.0, 1.0) : 0.0;
+}
+
+Doubt doubt_of(const ThermalHealth& message) {
+  Doubt doubt;
+  doubt.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
+  constexpr float misfit = 1.3F;  // noise units: a right alignment leaves less than one
+  if (message.residual_rms > misfit) {
+    doubt.value = 1.0;
+  } else if (message.state != ThermalHealth::OK) {
+    doubt.value = 0.75;
+  } else if ((message.flags & (ThermalHealth::FLAG_ALONG_TRACK_WEAK | ThermalHealth::FLAG_SATURATED)) != 0) {
+    doubt.value = 0.5;
+  } else if ((message.flags & ThermalHealth::FLAG_WEAK_TEXTURE) != 0) {
+    doubt.value = 0.25;
+  }
+  return doubt;
+}
+
+}  // namespace adit::state_estimator
