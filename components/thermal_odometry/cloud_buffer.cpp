@@ -89,7 +89,8 @@ void CloudBuffer::add(const DepthPoints& cloud) {
   }
 }
 
-std::span<const Eigen::Vector3f> CloudBuffer::at(std::int64_t stamp_ns, const PoseHistory& history) {
+std::span<const Eigen::Vector3f> CloudBuffer::at(std::int64_t stamp_ns, const PoseHistory& history,
+                                                 const Eigen::Matrix3d& boresight) {
   moved_.clear();
   const Cloud* best = nullptr;
   const auto max_age_ns = static_cast<std::int64_t>(1e9 * max_age_s_);
@@ -102,14 +103,14 @@ std::span<const Eigen::Vector3f> CloudBuffer::at(std::int64_t stamp_ns, const Po
   }
   if (best == nullptr) return {};
   std::array<Eigen::Isometry3f, bins> motion;
-  motion.fill(Eigen::Isometry3f::Identity());
+  motion.fill(Eigen::Isometry3f(boresight.cast<float>()));
   const float span_s = best->last_offset_s - best->first_offset_s;
   if (const std::optional<Pose> now = history.at(stamp_ns)) {
     for (int i = 0; i < bins; ++i) {
       const float offset = best->first_offset_s + span_s * static_cast<float>(i) / (bins - 1);
       const std::optional<Pose> then =
           history.at(best->stamp_ns + static_cast<std::int64_t>(1e9 * static_cast<double>(offset)));
-      if (then) motion[static_cast<std::size_t>(i)] = (*now * then->inverse()).cast<float>();
+      if (then) motion[static_cast<std::size_t>(i)] = (*now * then->inverse() * Pose(boresight)).cast<float>();
     }
   }
   for (std::size_t i = 0; i < best->points.size(); ++i) {

@@ -42,7 +42,9 @@ class CloudBuffer {
   // Points in the camera frame at `stamp_ns`, from the newest cloud whose last point is at most max_age older and 50 ms
   // newer. Without a history both instants are taken as the same place. Empty: no such cloud. Valid until the next
   // call.
-  std::span<const Eigen::Vector3f> at(std::int64_t stamp_ns, const PoseHistory& history);
+  // `boresight`: turns the points in the camera frame of their own time.
+  std::span<const Eigen::Vector3f> at(std::int64_t stamp_ns, const PoseHistory& history,
+                                      const Eigen::Matrix3d& boresight = Eigen::Matrix3d::Identity());
 
  private:
   struct Cloud {

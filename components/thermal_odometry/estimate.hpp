@@ -65,6 +65,10 @@ struct Estimate {
   double log_scale_sigma = 1.0;       // of ln(true / estimated length)
   double log_scale_correction = 0.0;  // applied to the map at this frame when LiDAR came back; else 0
 
+  // Rotation the LiDAR's extrinsics lack, as a vector in camera axes [rad] about the camera, and its covariance.
+  Eigen::Vector3d boresight = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d boresight_covariance = Eigen::Matrix3d::Zero();
+
   bool new_keyframe = false;
   int selected = 0;       // pixels chosen at the newest keyframe
   int anchored = 0;       // of them with LiDAR depth

@@ -284,6 +284,18 @@ int study(const Options& options) {
       std::sqrt(squares / std::max(1, n)), similar.rmse, 100.0 * similar.rmse / path_length, similar.scale,
       100.0 * rigid.rmse / path_length, static_cast<double>(counters.keyframes) / (seconds.back() - seconds.front()),
       frame_ms.get(), keyframe_ms.get());
+  const Eigen::Vector3d turned = 180.0 / M_PI *
+                                 so3_log((truths[0].inverse() * truths.back()).rotation().transpose() *
+                                         (estimates[0].inverse() * estimates.back()).rotation());
+  std::printf("  turned too far at the end: pitch %+.3f yaw %+.3f roll %+.3f deg\n", turned.x(), turned.y(),
+              turned.z());
+  if (!options.mono) {
+    const Estimate& last = (*odometry)->estimate();
+    const Eigen::Vector3d found = 180.0 / M_PI * last.boresight;
+    const Eigen::Vector3d sigma = 180.0 / M_PI * last.boresight_covariance.diagonal().cwiseSqrt();
+    std::printf("  boresight [deg]: %+.3f (sigma %.3f) %+.3f (%.3f) %+.3f (%.3f)\n", found.x(), sigma.x(), found.y(),
+                sigma.y(), found.z(), sigma.z());
+  }
   if (shutter.events > 0) {
     std::printf(
         "  FFC: %d events, %d frozen frames, %d of them measured; %d recovered, at the latest with live frame %d\n",

@@ -52,7 +52,14 @@ int Mapper::add_anchored(std::span<const Pixel> pixels, int slot) {
     if (!depth) continue;
     const float loose = config_.lidar_looseness * depth->sigma;
     const Patch patch{pixel.u, pixel.v, depth->inverse_depth, depth->slope_u, depth->slope_v, depth->sigma, slot};
-    if (window_.add_point(patch, 1.0F / (loose * loose))) ++n;
+    // The plane m . X = 1 behind the pixel, inverse depth m . (x, y, 1), turns with the LiDAR: m -> m + rotation x m.
+    const auto fx = static_cast<float>(camera_.fx);
+    const auto fy = static_cast<float>(camera_.fy);
+    const Eigen::Vector3f ray((pixel.u - static_cast<float>(camera_.cx)) / fx,
+                              (pixel.v - static_cast<float>(camera_.cy)) / fy, 1.0F);
+    Eigen::Vector3f plane(depth->slope_u * fx, depth->slope_v * fy, depth->inverse_depth);
+    plane.z() -= plane.head<2>().dot(ray.head<2>());
+    if (window_.add_point(patch, 1.0F / (loose * loose), plane.cross(ray))) ++n;
   }
   return n;
 }
@@ -155,7 +162,8 @@ Mapper::Report Mapper::add_keyframe(std::int64_t stamp_ns, const CameraState& st
   Report report;
   const std::span<const Pixel> pixels = selector_.select(image, rectifier);
   report.selected = static_cast<int>(pixels.size());
-  anchor_.project(lidar ? clouds_.at(stamp_ns, history) : std::span<const Eigen::Vector3f>{}, state.rate);
+  const Eigen::Matrix3d boresight = so3_exp(window_.boresight());
+  anchor_.project(lidar ? clouds_.at(stamp_ns, history, boresight) : std::span<const Eigen::Vector3f>{}, state.rate);
   for (const Pixel& pixel : pixels) report.anchored += anchor_.depth_at(pixel.u, pixel.v) ? 1 : 0;
   report.metric = report.anchored >= config_.min_points;
   const bool first = empty();

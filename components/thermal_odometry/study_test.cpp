@@ -117,7 +117,7 @@ TEST(Study, BoresightAndTimeOffset) {
   const Figures yaw = show("LiDAR yaw wrong by 0.3 deg", {.yaw_error_deg = 0.3});
   show("same, frame to keyframe alone", {.yaw_error_deg = 0.3, .optimise = false});
   const Figures late = show("LiDAR stamps wrong by 10 ms", {.time_offset_s = 0.01});
-  EXPECT_LE(yaw.drift_percent, 0.4);
+  EXPECT_LE(yaw.drift_percent, 0.3);
   EXPECT_LE(late.drift_percent, 0.3);
 }
 

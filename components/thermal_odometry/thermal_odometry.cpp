@@ -213,6 +213,8 @@ class ThermalOdometry::Engine {
     } else if (out_.scale == ScaleState::metric) {
       out_.scale = ScaleState::carried;
     }
+    out_.boresight = mapper_.window().boresight();
+    out_.boresight_covariance = mapper_.window().boresight_covariance();
     out_.log_scale_correction = report.log_scale_correction;
     if (report.log_scale_correction != 0.0) ++out_.counters.scale_corrections;
   }

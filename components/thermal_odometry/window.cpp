@@ -16,6 +16,8 @@ Window::Window(const Pinhole& camera, std::size_t capacity, const Config& config
   points_.reserve(capacity);
   systems_.reserve(capacity);
   couplings_.resize(capacity);
+  boresight_covariance_ = config.boresight_sigma * config.boresight_sigma * Eigen::Matrix3d::Identity();
+  begin_prior();
 }
 
 void Window::clear() {
@@ -25,9 +27,17 @@ void Window::clear() {
   }
   newest_ = -1;
   points_.clear();
+  begin_prior();
+  sigma_ = 1.5F;
+}
+
+// Nothing is known but the boresight.
+void Window::begin_prior() {
   prior_H_.setZero();
   prior_g_.setZero();
-  sigma_ = 1.5F;
+  const Eigen::Matrix3d information = (boresight_covariance_ + 1e-14 * Eigen::Matrix3d::Identity()).inverse();
+  prior_H_.bottomRightCorner<boresight_size, boresight_size>() = information;
+  prior_g_.tail<boresight_size>() = -information * boresight_;
 }
 
 int Window::free_slot() const {
@@ -71,11 +81,12 @@ int Window::add_keyframe(std::int64_t stamp_ns, const CameraState& state, Pyrami
   return slot;
 }
 
-bool Window::add_point(const Patch& patch, float prior_information) {
+bool Window::add_point(const Patch& patch, float prior_information, const Eigen::Vector3f& by_boresight) {
   if (points_.size() == points_.capacity()) return false;
   WindowPoint point;
   point.patch = patch;
-  point.prior_depth = patch.inverse_depth;
+  point.prior_depth = patch.inverse_depth - by_boresight.dot(boresight_.cast<float>());
+  point.by_boresight = by_boresight;
   point.prior_information = prior_information;
   if (!take_template(keyframe(patch.host).image.level(0), patch.u, patch.v, config_.gradient_scale, point.look))
     return false;
@@ -95,6 +106,7 @@ Window::Vector Window::delta() const {
   for (int i = 0; i < max_keyframes; ++i) {
     if (keyframe(i).used) x.segment<state_size>(i * state_size) = keyframe(i).delta;
   }
+  x.tail<boresight_size>() = boresight_;
   return x;
 }
 
@@ -104,6 +116,7 @@ void Window::apply(const Vector& step) {
     keyframe(i).delta += step.segment<state_size>(i * state_size);
     update_state(keyframe(i));
   }
+  boresight_ += step.tail<boresight_size>();
 }
 
 Window::Stats Window::optimise(int iterations) {
@@ -129,6 +142,7 @@ Window::Stats Window::optimise(int iterations) {
       g[at + 7] += b_information * keyframe(s).state.b;
       for (int k = s == held ? 6 : 0; k < state_size; ++k) index[static_cast<std::size_t>(active++)] = at + k;
     }
+    for (int k = 0; k < boresight_size; ++k) index[static_cast<std::size_t>(active++)] = boresight_at + k;
     // Solve on the used slots, scaled to a unit diagonal.
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, dimension, dimension> A(active, active);
     Eigen::Matrix<double, Eigen::Dynamic, 1, 0, dimension, 1> b(active);
@@ -144,7 +158,8 @@ Window::Stats Window::optimise(int iterations) {
       A(r, r) *= 1.0 + 1e-5;
       b[r] = scale[r] * g[index[static_cast<std::size_t>(r)]];
     }
-    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, dimension, 1> y = A.ldlt().solve(b);
+    const Eigen::LDLT<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, dimension, dimension>> factors(A);
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, dimension, 1> y = factors.solve(b);
     Vector step = Vector::Zero();
     for (int r = 0; r < active; ++r) step[index[static_cast<std::size_t>(r)]] = -scale[r] * y[r];
     if (!step.allFinite() || step.cwiseAbs().maxCoeff() > 1e4) {
@@ -164,6 +179,11 @@ Window::Stats Window::optimise(int iterations) {
       patch.slope_v *= patch.inverse_depth / old;
     }
     apply(step);
+    Eigen::Matrix<double, Eigen::Dynamic, boresight_size, 0, dimension, boresight_size> unit(active, boresight_size);
+    unit.setZero();
+    unit.bottomRows<boresight_size>() = scale.tail<boresight_size>().asDiagonal();
+    boresight_covariance_ =
+        config_.correlation * (scale.asDiagonal() * factors.solve(unit)).bottomRows<boresight_size>();
     double moved = 0.0;
     for (int s = 0; s < max_keyframes; ++s) moved = std::max(moved, step.segment<6>(s * state_size).norm());
     if (moved < 1e-5) break;
@@ -190,8 +210,26 @@ Window::Stats Window::optimise(int iterations) {
     k.first = k.state;
     k.delta.setZero();
   }
+  loosen_boresight();
   stats.points = static_cast<int>(points_.size());
   return stats;
+}
+
+// One step of its random walk in the prior: joins the next boresight to the last and eliminates the last.
+void Window::loosen_boresight() {
+  constexpr int n = boresight_size;
+  const double stiffness = 1.0 / (config_.boresight_walk * config_.boresight_walk);
+  const Eigen::Matrix3d inverse =
+      (prior_H_.bottomRightCorner<n, n>() + stiffness * Eigen::Matrix3d::Identity()).inverse();
+  const Eigen::Matrix<double, boresight_at, n> gain = prior_H_.topRightCorner<boresight_at, n>() * inverse;
+  const Eigen::Vector3d g = prior_g_.tail<n>();
+  prior_g_.head<boresight_at>() -= gain * g;
+  prior_g_.tail<n>() = stiffness * inverse * g;
+  prior_H_.topLeftCorner<boresight_at, boresight_at>() -=
+      gain.lazyProduct(prior_H_.bottomLeftCorner<n, boresight_at>());
+  prior_H_.topRightCorner<boresight_at, n>() = stiffness * gain;
+  prior_H_.bottomLeftCorner<n, boresight_at>() = stiffness * gain.transpose();
+  prior_H_.bottomRightCorner<n, n>() = stiffness * (Eigen::Matrix3d::Identity() - stiffness * inverse);
 }
 
 void Window::remove_marked() {

@@ -16,6 +16,7 @@ namespace adit::thermal_odometry {
 
 inline constexpr int max_keyframes = 7;
 inline constexpr int state_size = 8;  // pose increment, a, b
+inline constexpr int boresight_size = 3;
 
 struct Keyframe {
   bool used = false;
@@ -34,9 +35,10 @@ enum class Sight : std::uint8_t { untried, in, outlier, outside };
 struct WindowPoint {
   Patch patch;  // host: slot of the keyframe
   PatchTemplate look;
-  float prior_depth = 0.0F;
-  float prior_information = 0.0F;  // 0: no LiDAR
-  float hessian = 0.0F;            // information on the inverse depth from the pixels, of the last linearisation
+  float prior_depth = 0.0F;                                // LiDAR's, as it would be with the extrinsics as given
+  float prior_information = 0.0F;                          // 0: no LiDAR
+  Eigen::Vector3f by_boresight = Eigen::Vector3f::Zero();  // d(LiDAR's inverse depth)/d(boresight) [1/m a rad]
+  float hessian = 0.0F;  // information on the inverse depth from the pixels, of the last linearisation
   std::array<Sight, max_keyframes> sight{};
   int good = 0;  // targets it is seen in as an inlier
   bool anchored() const { return prior_information > 0.0F; }
@@ -44,7 +46,8 @@ struct WindowPoint {
 
 class Window {
  public:
-  static constexpr int dimension = max_keyframes * state_size;
+  static constexpr int boresight_at = max_keyframes * state_size;
+  static constexpr int dimension = boresight_at + boresight_size;
   using Matrix = Eigen::Matrix<double, dimension, dimension>;
   using Vector = Eigen::Matrix<double, dimension, 1>;
 
@@ -59,8 +62,13 @@ class Window {
     double offset_sigma = 100.0;
     double correlation = 10.0;  // photometric information counts this much too often
     // Of points that enter the prior. DSO takes 0.25; with few keyframes and LiDAR depth that lets the window turn
-    // against its past (measured: twice the rotation drift).
-    double marginal_weight = 1.0;
+    // against its past (measured: twice the rotation drift). Without LiDAR depth 1 keeps the scale's errors for good.
+    float anchored_marginal_weight = 1.0F;
+    float marginal_weight = 0.25F;
+    // Rotation of the LiDAR's points about the camera that its extrinsics lack: standard deviation as given [rad a
+    // axis] (0.3 degrees), and its random walk from keyframe to keyframe, which keeps it adaptive.
+    double boresight_sigma = 0.005;
+    double boresight_walk = 5e-5;
     float min_hessian = 8.0F;  // times 1/d^2: relative depth information a marginalised point needs
   };
   Window(const Pinhole& camera, std::size_t capacity, const Config& config);
@@ -78,8 +86,10 @@ class Window {
 
   // Swaps `image` into a free slot.
   int add_keyframe(std::int64_t stamp_ns, const CameraState& state, Pyramid& image);
-  // False if the window is full or the pattern leaves the host image.
-  bool add_point(const Patch& patch, float prior_information);
+  // False if the window is full or the pattern leaves the host image. `by_boresight`: of a LiDAR depth (the patch's)
+  // that was projected with the present boresight().
+  bool add_point(const Patch& patch, float prior_information,
+                 const Eigen::Vector3f& by_boresight = Eigen::Vector3f::Zero());
 
   struct Stats {
     float sigma = 0.0F;
@@ -99,6 +109,11 @@ class Window {
   int least_useful() const;
   // Points whose host stays but which neither of the two newest keyframes sees: into the prior.
   void retire_points();
+  // Rotation vector in camera axes to turn the LiDAR's points in the camera frame by [rad]. Estimated with everything
+  // else from how the depths the pixels agree on differ from the LiDAR's; survives clear(), as its covariance does.
+  const Eigen::Vector3d& boresight() const { return boresight_; }
+  const Eigen::Matrix3d& boresight_covariance() const { return boresight_covariance_; }
+
   // Everything `factor` times as large, about the newest keyframe's centre.
   void rescale(double factor);
 
@@ -121,7 +136,7 @@ class Window {
   DepthBlock depth_block(std::size_t point) const { return {systems_[point].H, systems_[point].g, couplings_[point]}; }
   const Matrix& prior_H() const { return prior_H_; }
   const Vector& prior_g() const { return prior_g_; }
-  // State vector: the deltas of all slots.
+  // State vector: the deltas of all slots, the boresight.
   Vector delta() const;
   void apply(const Vector& step);
   float sigma() const { return sigma_; }
@@ -133,6 +148,8 @@ class Window {
     bool marked = false;
   };
   void update_state(Keyframe& keyframe);
+  void begin_prior();
+  void loosen_boresight();
   void remove_marked();
   void eliminate(int slot);
 
@@ -146,6 +163,8 @@ class Window {
   std::vector<Eigen::Matrix<float, dimension, 1>> couplings_;
   Matrix prior_H_ = Matrix::Zero();
   Vector prior_g_ = Vector::Zero();
+  Eigen::Vector3d boresight_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d boresight_covariance_;
   Normal normal_;
   float sigma_ = 1.5F;
 };

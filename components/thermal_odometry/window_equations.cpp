@@ -66,6 +66,10 @@ const Window::Normal& Window::linearise(bool only_marked, double depth_damping) 
     point.good = 0;
     int targets = 0;
     const auto host = static_cast<std::size_t>(patch.host);
+    // What enters the prior counts less where neighbouring residuals say the same again and nothing contradicts them.
+    const float share = !only_marked       ? 1.0F
+                        : point.anchored() ? config_.anchored_marginal_weight
+                                           : config_.marginal_weight;
     for (int t = 0; t < max_keyframes; ++t) {
       if (t == patch.host || !keyframe(t).used) continue;
       Sight& sight = point.sight[static_cast<std::size_t>(t)];
@@ -88,7 +92,7 @@ const Window::Normal& Window::linearise(bool only_marked, double depth_damping) 
       ++point.good;
       ++normal_.residuals;
       const Pattern robust = point.look.weight * (nu + 1.0F) / (nu + normalised);
-      const Pattern w = robust * inverse_sigma2;
+      const Pattern w = share * inverse_sigma2 * robust;
       normal_.scale += static_cast<double>((robust * r.square()).mean());
       normal_.energy += static_cast<double>((robust * normalised).mean());
 
@@ -115,16 +119,29 @@ const Window::Normal& Window::linearise(bool only_marked, double depth_damping) 
       seen[static_cast<std::size_t>(targets++)] = t;
     }
     point.hessian = system.H;
-    system.H += point.prior_information;
-    system.g += point.prior_information * (patch.inverse_depth - point.prior_depth);
+    const float information = share * point.prior_information;
+    const float disagreement =
+        patch.inverse_depth - point.prior_depth - point.by_boresight.dot(boresight_.cast<float>());
+    system.H += information;
+    system.g += information * disagreement;
     system.H *= static_cast<float>(1.0 + depth_damping);
     if (targets == 0 || !(system.H > 1e-6F)) {
       system.H = 0.0F;
       continue;
     }
     seen[static_cast<std::size_t>(targets++)] = patch.host;
+    if (point.anchored()) {
+      const Eigen::Vector3f by = -information * point.by_boresight;
+      coupling.tail<boresight_size>() = by;
+      normal_.H.bottomRightCorner<boresight_size, boresight_size>() -=
+          (by * point.by_boresight.transpose()).cast<double>();
+      normal_.g.tail<boresight_size>() += (disagreement * by).cast<double>();
+    }
     // Eliminating the depth: a rank-one update on the blocks of the keyframes that see the point.
     const double inverse = 1.0 / static_cast<double>(system.H);
+    const Eigen::Vector3d turning = coupling.tail<boresight_size>().cast<double>();
+    normal_.H.bottomRightCorner<boresight_size, boresight_size>() -= inverse * turning * turning.transpose();
+    normal_.g.tail<boresight_size>() -= inverse * static_cast<double>(system.g) * turning;
     for (int a = 0; a < targets; ++a) {
       const int ra = seen[static_cast<std::size_t>(a)] * state_size;
       const Eigen::Matrix<double, state_size, 1> ca = coupling.segment<state_size>(ra).cast<double>() * inverse;
@@ -135,6 +152,7 @@ const Window::Normal& Window::linearise(bool only_marked, double depth_damping) 
         normal_.H.block<state_size, state_size>(ra, rb).noalias() -=
             ca.lazyProduct(coupling.segment<state_size>(rb).cast<double>().transpose());
       }
+      normal_.H.block<boresight_size, state_size>(boresight_at, ra).noalias() -= turning.lazyProduct(ca.transpose());
     }
   }
   // Lower triangle so far; the pairs' blocks are stitched into it with their adjoints.

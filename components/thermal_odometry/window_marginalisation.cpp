@@ -76,8 +76,8 @@ void Window::eliminate(int slot) {
   }
   linearise(true, 0.0);
   const Vector x = delta();
-  prior_H_ += config_.marginal_weight * normal_.H;
-  prior_g_ += config_.marginal_weight * (normal_.g - normal_.H * x);
+  prior_H_ += normal_.H;
+  prior_g_ += normal_.g - normal_.H * x;
   for (int s = 0; s < max_keyframes; ++s) {
     if (keyframe(s).used && normal_.H(s * state_size, s * state_size) > 0.0) keyframe(s).in_prior = true;
   }
@@ -155,6 +155,7 @@ void Window::rescale(double factor) {
                          &point.prior_depth}) {
       *value *= f;
     }
+    point.by_boresight *= f;
     point.prior_information /= f * f;
   }
 }

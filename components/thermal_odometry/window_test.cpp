@@ -68,6 +68,44 @@ struct Toy {
   }
 };
 
+// What the LiDAR says of every pixel when its points are turned by `rotation`: to first order, as the window takes it.
+void turn_the_lidar(Toy& toy, const Eigen::Vector3d& rotation) {
+  for (WindowPoint& point : toy.window.points()) {
+    const Pose& T = toy.truth[static_cast<std::size_t>(point.patch.host)];
+    const double u = point.patch.u, v = point.patch.v;
+    const auto inverse = [&](double du, double dv) { return 1.0 / toy.scene.depth(T, u + du, v + dv); };
+    const Eigen::Vector3d ray((u - toy.pinhole.cx) / toy.pinhole.fx, (v - toy.pinhole.cy) / toy.pinhole.fy, 1.0);
+    Eigen::Vector3d plane(toy.pinhole.fx * (inverse(0.5, 0) - inverse(-0.5, 0)),
+                          toy.pinhole.fy * (inverse(0, 0.5) - inverse(0, -0.5)), inverse(0, 0));
+    plane.z() -= plane.head<2>().dot(ray.head<2>());
+    point.by_boresight = plane.cross(ray).cast<float>();
+    point.prior_depth += static_cast<float>(plane.cross(ray).dot(rotation));
+  }
+}
+
+TEST(Window, ABoresightErrorIsFoundAndItsCovarianceSaysHowWell) {
+  const double degree = M_PI / 180.0;
+  for (const Eigen::Vector3d& wrong : {Eigen::Vector3d(0, 0.3, 0), Eigen::Vector3d(-0.2, 0.1, 0.2)}) {
+    Toy toy;
+    for (int i = 0; i < 6; ++i) toy.add(0.4 * i, 0.005, 0.02, 1, 1.0);
+    turn_the_lidar(toy, wrong * degree);
+    const Eigen::Vector3d before = toy.window.boresight_covariance().diagonal();
+    toy.window.optimise(10);
+    const Eigen::Vector3d error = toy.window.boresight() + wrong * degree;
+    const Eigen::Vector3d after = toy.window.boresight_covariance().diagonal();
+    EXPECT_LT(error.norm(), 0.3 * wrong.norm() * degree) << toy.window.boresight().transpose() / degree;
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_LT(after[k], before[k]);
+      EXPECT_LT(error[k] * error[k], 9.0 * after[k]);
+    }
+    // It is known in the next map as well.
+    const Eigen::Vector3d found = toy.window.boresight();
+    toy.window.clear();
+    EXPECT_EQ(toy.window.boresight(), found);
+    EXPECT_LT((toy.window.prior_H() * toy.window.delta() + toy.window.prior_g()).norm(), 1e-6);
+  }
+}
+
 TEST(Window, BlockEliminationKeepsTheOptimum) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
