@@ -11,6 +11,7 @@ namespace adit::thermal_odometry {
 namespace {
 
 constexpr float nu = 5.0F;
+constexpr double clearly_better = 0.98;  // share of the energy below which another solution replaces the one found
 constexpr std::array<int, Pyramid::max_levels> iterations_at{8, 10, 15, 25, 25};
 
 float median(std::vector<float>& values) {
@@ -25,6 +26,10 @@ Initialiser::Initialiser(const Pinhole& camera, int width, int levels, std::size
     : camera_(camera), width_(width), levels_(levels), config_(config) {
   points_.reserve(capacity);
   backup_.reserve(capacity);
+  for (Solution* solution : {&best_, &rival_}) {
+    solution->depths.reserve(capacity);
+    solution->anchors.reserve(capacity);
+  }
   eliminations_.reserve(capacity);
   patches_.reserve(capacity);
   scratch_.reserve(capacity);
@@ -249,7 +254,55 @@ Initialiser::Outcome Initialiser::add(const Pyramid& image) {
   const bool agree = finite && inlier_share_ > 0.4F && visible_share_ > 0.4F;
   if (!agree || parallax_ > config_.max_flow * static_cast<float>(width_)) return Outcome::lost;
   const bool enough = parallax_ > config_.min_parallax * static_cast<float>(width_) && frames_ >= config_.min_frames;
-  return enough && inlier_share_ > config_.min_inlier_share ? Outcome::done : Outcome::waiting;
+  if (!enough || !(inlier_share_ > config_.min_inlier_share)) return Outcome::waiting;
+  if (!beaten_by_a_rival(image)) return Outcome::done;
+  frames_ = 0;  // the better one has to prove itself as long
+  velocity_.setZero();
+  return Outcome::waiting;
+}
+
+// Two views of little parallax have several solutions that look alike: a turn taken for a step aside, depth inside out.
+// Faint texture, whose depths stay near where they began, is held by the wrong one. So the others are tried: along
+// every axis, without a turn, from flat depth. True: one was clearly better and has replaced the one found.
+bool Initialiser::beaten_by_a_rival(const Pyramid& image) {
+  const float sigma = sigma_;  // energies are comparable in one unit
+  store(image, best_);
+  const CameraState found = state_;
+  const double step = found.T_cw.translation().norm();
+  bool beaten = false;
+  for (int i = 0; i < 6; ++i) {
+    state_ = found;
+    state_.T_cw = Pose::Identity();
+    state_.T_cw.translation()[i / 2] = i % 2 == 0 ? -step : step;
+    for (Point& point : points_) point.d = point.anchor = 1.0F;
+    for (int level = std::min(levels_ - 1, 3); level >= 0; --level) {
+      refine(image, level, iterations_at[static_cast<std::size_t>(level)]);
+      lean_on_neighbours();
+    }
+    sigma_ = sigma;
+    store(image, rival_);
+    if (!(rival_.energy < clearly_better * best_.energy)) continue;
+    std::swap(rival_, best_);
+    beaten = true;
+  }
+  state_ = best_.state;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    points_[i].d = best_.depths[i];
+    points_[i].anchor = best_.anchors[i];
+  }
+  measure(image);
+  return beaten;
+}
+
+void Initialiser::store(const Pyramid& image, Solution& out) {
+  out.state = state_;
+  out.energy = linearise(image, state_, 0, 0.0).energy;
+  out.depths.clear();
+  out.anchors.clear();
+  for (const Point& point : points_) {
+    out.depths.push_back(point.d);
+    out.anchors.push_back(point.anchor);
+  }
 }
 
 std::span<const Patch> Initialiser::patches() {

@@ -35,7 +35,8 @@ class Initialiser {
   void stop() { active_ = false; }
 
   enum class Outcome { waiting, done, lost };
-  // Aligns one more frame to the first view. `done`: parallax, residuals and depths are good enough to build a map.
+  // Aligns one more frame to the first view. `done`: parallax, residuals and depths are good enough to build a map, and
+  // no other direction of travel explains the pixels better.
   Outcome add(const Pyramid& image);
 
   std::int64_t stamp_ns() const { return stamp_ns_; }
@@ -73,6 +74,14 @@ class Initialiser {
   void lean_on_neighbours();
   void find_neighbours();
   void measure(const Pyramid& image);
+  struct Solution {
+    CameraState state;
+    std::vector<float> depths;
+    std::vector<float> anchors;
+    double energy = 0.0;
+  };
+  void store(const Pyramid& image, Solution& out);
+  bool beaten_by_a_rival(const Pyramid& image);
 
   Pinhole camera_;
   int width_;
@@ -90,6 +99,8 @@ class Initialiser {
   float visible_share_ = 0.0F;
   std::vector<Point> points_;
   std::vector<float> backup_;
+  Solution best_;
+  Solution rival_;
   std::array<std::vector<PatchTemplate>, Pyramid::max_levels> looks_;
   struct Elimination {
     float H = 0.0F;

@@ -40,7 +40,7 @@ struct Config {
   double max_keyframe_age_s = 1.0;
   double anchored_keyframe_flow = 0.125;  // of the image width, median
   double mono_keyframe_flow = 0.05;
-  double anchored_visible_share = 0.5;
+  double anchored_visible_share = 0.35;
   double mono_visible_share = 0.6;
   double young_keyframe_age_s = 0.1;  // at least, when less than two thirds of the visible share are left
   int restart_after = 5;              // frames that could not be aligned
