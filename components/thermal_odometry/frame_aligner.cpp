@@ -66,7 +66,19 @@ FrameAligner::Alignment FrameAligner::align(const Tracker& tracker, const Pyrami
   const Tracker::PosePrior* information = said && config_.prior_as_information ? &*said : nullptr;
   out.result = tracker.track(image, start, top, information, &before);
   if (!out.result.ok) out.result = search(tracker, image, start, information, before);
+  const Pose& expected = said ? said->T_cw : out.predicted;
+  const bool foreseen = said || has_velocity_;
+  if (out.gap && foreseen && out.result.ok && !within_reach(out.result, expected, out.dt)) {
+    start.T_cw = expected;
+    out.result = tracker.track(image, start, usual_top, information, &before);
+    out.result.ok = out.result.ok && within_reach(out.result, expected, out.dt);
+  }
   return out;
+}
+
+bool FrameAligner::within_reach(const TrackResult& result, const Pose& expected, double dt) const {
+  const Eigen::Vector3d off = result.state.T_cw.inverse().translation() - expected.inverse().translation();
+  return off.norm() <= 0.5 * config_.max_acceleration * dt * dt;
 }
 
 // Small rotations about the start, from the coarsest level: only after a failure.

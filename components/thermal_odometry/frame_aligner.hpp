@@ -14,6 +14,10 @@ class FrameAligner {
   struct Config {
     double gap_s = 0.1;                 // longer since the last frame: start coarser, from several poses
     bool prior_as_information = false;  // besides starting there: add the prior to the normal equations (paper R63)
+    // What may have changed the velocity while nothing was seen [m/s2]: walls that look alike offer other places, and
+    // one that only a stronger push explains is refused. In the unit of a monocular map, usually several metres, a weak
+    // check. An emergency stop from 50 km/h is 8.
+    double max_acceleration = 10.0;
   };
   explicit FrameAligner(const Config& config) : config_(config) {}
 
@@ -24,7 +28,8 @@ class FrameAligner {
     Pose predicted = Pose::Identity();  // T_cw by constant velocity
   };
   // From the cheapest of the constant-velocity pose, the prior's and, after a gap, the last one; if that fails by small
-  // turns about it. Changes nothing here.
+  // turns about it. After a gap a place that constant velocity (or the prior) cannot have led to is not believed: then
+  // from there alone and without the coarsest levels, or not at all. Changes nothing here.
   Alignment align(const Tracker& tracker, const Pyramid& image, std::int64_t stamp_ns, double reference_gain,
                   const Prior* prior) const;
 
@@ -50,6 +55,7 @@ class FrameAligner {
  private:
   TrackResult search(const Tracker& tracker, const Pyramid& image, const CameraState& start,
                      const Tracker::PosePrior* prior, const Tracker::Before& before) const;
+  bool within_reach(const TrackResult& result, const Pose& expected, double dt) const;
 
   Config config_;
   CameraState state_;

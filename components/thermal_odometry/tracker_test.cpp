@@ -6,6 +6,7 @@
 #include <random>
 
 #include "components/thermal_odometry/depth_anchor.hpp"
+#include "components/thermal_odometry/frame_aligner.hpp"
 #include "components/thermal_odometry/front_end.hpp"
 #include "components/thermal_odometry/selection.hpp"
 #include "components/thermal_odometry/test_scene.hpp"
@@ -146,6 +147,27 @@ TEST(Tracker, CovarianceIsConsistent) {
   }
   EXPECT_GT(nees, 1.5);
   EXPECT_LT(nees, 12.0);
+}
+
+// Half a second without pictures at 5 m/s: where the camera then is must be where some braking could have left it.
+TEST(FrameAligner, AfterABlindGapAPlaceNoAccelerationLeadsToIsRefused) {
+  Bench bench;
+  FrameAligner aligner(FrameAligner::Config{});
+  aligner.place(1, Pose::Identity());
+  aligner.set_velocity((Vector6d() << 0, 0, -5.0, 0, 0, 0).finished());  // of T_cw
+  const auto place_at = [&](double z, const Prior* prior) {
+    Pose pose = Pose::Identity();
+    pose.translation().z() = z;
+    bench.front_end.process(bench.scene.render(pose, 1), bench.current);
+    return aligner.align(*bench.tracker, bench.current, 500'000'001, 0.0, prior);
+  };
+  const FrameAligner::Alignment usual = place_at(2.3, nullptr);
+  EXPECT_TRUE(usual.result.ok);
+  EXPECT_NEAR(usual.result.state.T_cw.translation().z(), -2.3, 0.02);
+  EXPECT_FALSE(place_at(0.2, nullptr).result.ok);
+  Prior stood;
+  stood.covariance *= 1e-4;
+  EXPECT_TRUE(place_at(0.2, &stood).result.ok);  // unless somebody else knows of it
 }
 
 TEST(Tracker, RefusesPureNoise) {
