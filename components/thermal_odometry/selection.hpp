@@ -20,7 +20,7 @@ class PixelSelector {
   struct Config {
     int wanted = 500;
     float min_gradient = 0.5F;      // noise units a pixel
-    float noise_factor = 3.5F;      // times the gradient noise measured in the flattest tenth of the image
+    float noise_factor = 4.5F;      // times the gradient noise measured in the flattest tenth of the image
     float confirmation = 0.7F;      // of the threshold, on level 1, and at least
     float min_confirmation = 0.5F;  // noise units a level-1 pixel
     float strong = 3.0F;            // level-1 gradient that noise and fixed patterns do not reach
