@@ -59,15 +59,21 @@ const LoopClosure::Outcome& LoopClosure::add(const Pose& T_odom_camera, bool kno
                                              std::span<const Descriptor> descriptors) {
   outcome_ = {};
   if (!T_odom_camera.matrix().allFinite() || corners.size() != descriptors.size()) return outcome_;
-  Place place{T_odom_camera, 0.0, {corners.begin(), corners.end()}, {descriptors.begin(), descriptors.end()}};
-  double step = 0.0;
-  if (!places_.empty()) {
-    step = (T_odom_camera.translation() - places_.back().T_odom_camera.translation()).norm();
-    place.path = places_.back().path + step;
+  if (graph_.size() >= config_.max_keyframes) {
+    outcome_.result = Result::full;
+    ++counts_[static_cast<std::size_t>(outcome_.result)];
+    return outcome_;
   }
+  const double step = graph_.size() == 0 ? 0.0 : (T_odom_camera.translation() - last_.translation()).norm();
+  path_ += step;
   outcome_.node = add_to_graph(T_odom_camera, known, step);
+  Place place{
+      outcome_.node, T_odom_camera, path_, {corners.begin(), corners.end()}, {descriptors.begin(), descriptors.end()}};
   if (outcome_.node > 0) look_for_loop(place);
   ++counts_[static_cast<std::size_t>(outcome_.result)];
+  last_ = T_odom_camera;
+  const bool connected = outcome_.node > 0 || graph_.size() == 1;
+  if (!connected || outcome_.result == Result::closed) return outcome_;
   index_.add(place.descriptors);
   places_.push_back(std::move(place));
   return outcome_;
@@ -75,7 +81,7 @@ const LoopClosure::Outcome& LoopClosure::add(const Pose& T_odom_camera, bool kno
 
 pose_graph::NodeId LoopClosure::add_to_graph(const Pose& T_odom_camera, bool known, double step) {
   const auto node = graph_.add_node(T_map_odom_ * T_odom_camera);
-  if (!node || places_.empty()) return 0;
+  if (!node || *node == 0) return 0;
   // A restart keeps the last pose as its first: somewhere near, but nobody measured it.
   constexpr double unknown_translation = 5.0;  // m
   constexpr double unknown_rotation = 0.2;
@@ -86,7 +92,7 @@ pose_graph::NodeId LoopClosure::add_to_graph(const Pose& T_odom_camera, bool kno
   pose_graph::Edge edge;
   edge.from = *node - 1;
   edge.to = *node;
-  edge.T_from_to = places_.back().T_odom_camera.inverse() * T_odom_camera;
+  edge.T_from_to = last_.inverse() * T_odom_camera;
   edge.information.setZero();
   edge.information.diagonal().head<3>().setConstant(1.0 / (sigma_t * sigma_t));
   edge.information.diagonal().tail<3>().setConstant(1.0 / (sigma_r * sigma_r));
@@ -101,21 +107,22 @@ void LoopClosure::look_for_loop(const Place& place) {
   for (const PlaceIndex::Votes& votes : index_.query(place.descriptors, end, config_.candidates)) {
     if (votes.count < config_.min_votes) break;
     Outcome before = outcome_;
-    outcome_.from = votes.place;
+    const Place& old_place = places_[votes.place];
+    outcome_.from = old_place.node;
     outcome_.votes = votes.count;
-    outcome_.result = examine(votes.place, place);
+    outcome_.result = examine(old_place, place);
     if (outcome_.result == Result::closed) return;
     if (before.result > outcome_.result) outcome_ = before;
   }
 }
 
-LoopClosure::Result LoopClosure::examine(pose_graph::NodeId from, const Place& place) {
-  if (config_.gate && !within_reach(from)) return Result::out_of_reach;
-  const std::optional<Motion> motion = verify(places_[from], place);
+LoopClosure::Result LoopClosure::examine(const Place& old, const Place& place) {
+  if (config_.gate && !within_reach(old.node)) return Result::out_of_reach;
+  const std::optional<Motion> motion = verify(old, place);
   if (!motion) return Result::not_verified;
   outcome_.inliers = motion->inliers;
   pose_graph::Edge& edge = outcome_.edge;
-  edge.from = from;
+  edge.from = old.node;
   edge.to = outcome_.node;
   edge.T_from_to = motion->T_new_old.inverse();
   // The right increment of the inverse is the negative of the left increment of the motion: the same information.

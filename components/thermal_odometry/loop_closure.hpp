@@ -37,6 +37,9 @@ class LoopClosure {
     double drift_translation = 0.05;  // m per square root of a metre
     double drift_rotation = 0.0017;   // rad per square root of a metre
     bool gate = true;                 // off: for showing what it is good for
+    // Of the pose graph, whose solution takes longer with each; no more are added then, and the correction stays. A
+    // place takes 60 kB, a keyframe that met one again next to nothing.
+    std::size_t max_keyframes = 3000;
   };
   LoopClosure(const Pinhole& camera, const Config& config);
 
@@ -46,6 +49,7 @@ class LoopClosure {
     not_verified,  // no rigid motion explains enough matches
     refused,       // a motion that the odometry contradicts by more than 3 sigma
     closed,
+    full,  // max_keyframes: not looked at
   };
   struct Outcome {
     Result result = Result::new_place;
@@ -65,10 +69,13 @@ class LoopClosure {
   // Coordinates of the odometry frame to those of the map, at the newest keyframe; identity before the first closure.
   const Pose& T_map_odom() const { return T_map_odom_; }
   const pose_graph::PoseGraph& graph() const { return graph_; }
+  // Stored for recognition: a keyframe that met a place again is not stored beside it.
+  std::size_t places() const { return places_.size(); }
   int count(Result result) const { return counts_[static_cast<std::size_t>(result)]; }
 
  private:
   struct Place {
+    pose_graph::NodeId node = 0;
     Pose T_odom_camera;
     double path = 0.0;  // m
     std::vector<Corner> corners;
@@ -81,7 +88,7 @@ class LoopClosure {
   };
   pose_graph::NodeId add_to_graph(const Pose& T_odom_camera, bool known, double step);
   void look_for_loop(const Place& place);
-  Result examine(pose_graph::NodeId from, const Place& place);
+  Result examine(const Place& old, const Place& place);
   bool within_reach(pose_graph::NodeId from) const;
   std::optional<Motion> verify(const Place& old, const Place& now);
 
@@ -89,10 +96,12 @@ class LoopClosure {
   Config config_;
   pose_graph::PoseGraph graph_;
   PlaceIndex index_;
-  std::vector<Place> places_;
+  std::vector<Place> places_;     // by the index's numbers
+  Pose last_ = Pose::Identity();  // keyframe in the odometry frame
+  double path_ = 0.0;             // m, to it
   Pose T_map_odom_ = Pose::Identity();
   Outcome outcome_;
-  std::array<int, 5> counts_{};
+  std::array<int, 6> counts_{};
 };
 
 }  // namespace adit::thermal_odometry

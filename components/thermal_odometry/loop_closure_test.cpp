@@ -149,6 +149,19 @@ TEST(LoopClosure, TheSecondLapIsFoundAndHalvesTheError) {
   EXPECT_LT(drive.error_after(), 0.5 * drive.error_before());
 }
 
+TEST(LoopClosure, APlaceMetAgainIsNotStoredAgainAndAFullMapStaysAsItIs) {
+  TestScene scene;
+  LoopDrive drive(scene, {.max_keyframes = 30});
+  drive.drive(18, 1.5, 0.006, 0.0006);
+  drive.drive(20, -1.5, 0.006, 0.0006);
+  const LoopClosure& loops = drive.loops();
+  EXPECT_EQ(loops.graph().size(), 30U);
+  EXPECT_EQ(loops.count(Result::full), 8);
+  EXPECT_GT(loops.count(Result::closed), 3);
+  EXPECT_EQ(loops.places(), 30U - static_cast<std::size_t>(loops.count(Result::closed)));
+  EXPECT_FALSE(loops.T_map_odom().isApprox(Pose::Identity()));
+}
+
 TEST(LoopClosure, NewPlacesAreNotMistakenForOldOnes) {
   TestScene scene;
   LoopDrive drive(scene, {.gate = false});

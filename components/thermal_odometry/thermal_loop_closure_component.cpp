@@ -38,6 +38,8 @@ class ThermalLoopClosureComponent final : public Component {
   Param<double> min_path_{*this,       "min_path",      15.0,
                           Unit::metre, Range{0.0, 1e5}, "driven before a place can be met again"};
   Param<std::int64_t> min_inliers_{*this, "min_inliers", 15, Range{6, 1000}, "corners that agree on a motion"};
+  Param<std::int64_t> max_keyframes_{*this, "max_keyframes", 3000, Range{2, 100'000},
+                                     "of the map; then it is full (60 kB each that is a new place)"};
   Param<Numbers> camera_matrix_{*this, "camera_matrix", {}, "fx fy cx cy [px]; empty: from camera_info"};
   Param<std::vector<std::int64_t>> image_size_{*this, "image_size", {}, "width and height, with camera_matrix"};
   Param<Numbers> distortion_{*this, "distortion", {}, "k1 k2 p1 p2 [k3 [k4 k5 k6]], with camera_matrix"};
@@ -111,6 +113,7 @@ void ThermalLoopClosureComponent::start() {
   LoopClosure::Config config;
   config.min_path = min_path_;
   config.min_inliers = static_cast<int>(min_inliers_.value());
+  config.max_keyframes = static_cast<std::size_t>(max_keyframes_.value());
   loops_.emplace(thermal_odometry::pinhole_of(*camera_), config);
 }
 
@@ -192,11 +195,12 @@ void ThermalLoopClosureComponent::report() {
   if (!enabled_) return health(Health::ok, "off");
   if (!loops_) return health(Health::warn, trouble_.empty() ? "no camera_info yet" : trouble_);
   const auto count = [this](LoopClosure::Result result) { return std::to_string(loops_->count(result)); };
-  health(Health::ok, std::to_string(loops_->graph().size()) + " keyframes, " + count(LoopClosure::Result::closed) +
-                         " closures, " + count(LoopClosure::Result::out_of_reach) + " out of reach, " +
-                         count(LoopClosure::Result::not_verified) + " not verified, " +
-                         count(LoopClosure::Result::refused) + " refused" +
-                         (trouble_.empty() ? "" : " (" + trouble_ + ")"));
+  const bool full = loops_->count(LoopClosure::Result::full) > 0;
+  health(full ? Health::warn : Health::ok,
+         std::to_string(loops_->graph().size()) + (full ? " keyframes (full), " : " keyframes, ") +
+             count(LoopClosure::Result::closed) + " closures, " + count(LoopClosure::Result::out_of_reach) +
+             " out of reach, " + count(LoopClosure::Result::not_verified) + " not verified, " +
+             count(LoopClosure::Result::refused) + " refused" + (trouble_.empty() ? "" : " (" + trouble_ + ")"));
 }
 
 ADIT_COMPONENT(ThermalLoopClosureComponent, "thermal_loop_closure");
