@@ -256,7 +256,7 @@ Initialiser::Outcome Initialiser::add(const Pyramid& image) {
   const bool enough = parallax_ > config_.min_parallax * static_cast<float>(width_) && frames_ >= config_.min_frames;
   if (!enough || !(inlier_share_ > config_.min_inlier_share)) return Outcome::waiting;
   if (!beaten_by_a_rival(image)) return Outcome::done;
-  frames_ = 0;  // the better one has to prove itself as long
+  frames_ = config_.min_frames / 2;  // the better one has to prove itself, too
   velocity_.setZero();
   return Outcome::waiting;
 }

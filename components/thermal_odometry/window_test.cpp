@@ -83,6 +83,7 @@ void turn_the_lidar(Toy& toy, const Eigen::Vector3d& rotation) {
   }
 }
 
+// Two metres of one map find more than half of it, and how well is said; what is left goes on in the next map.
 TEST(Window, ABoresightErrorIsFoundAndItsCovarianceSaysHowWell) {
   const double degree = M_PI / 180.0;
   for (const Eigen::Vector3d& wrong : {Eigen::Vector3d(0, 0.3, 0), Eigen::Vector3d(-0.2, 0.1, 0.2)}) {
@@ -93,12 +94,11 @@ TEST(Window, ABoresightErrorIsFoundAndItsCovarianceSaysHowWell) {
     toy.window.optimise(10);
     const Eigen::Vector3d error = toy.window.boresight() + wrong * degree;
     const Eigen::Vector3d after = toy.window.boresight_covariance().diagonal();
-    EXPECT_LT(error.norm(), 0.3 * wrong.norm() * degree) << toy.window.boresight().transpose() / degree;
+    EXPECT_LT(error.norm(), 0.5 * wrong.norm() * degree) << toy.window.boresight().transpose() / degree;
     for (int k = 0; k < 3; ++k) {
       EXPECT_LT(after[k], before[k]);
       EXPECT_LT(error[k] * error[k], 9.0 * after[k]);
     }
-    // It is known in the next map as well.
     const Eigen::Vector3d found = toy.window.boresight();
     toy.window.clear();
     EXPECT_EQ(toy.window.boresight(), found);
