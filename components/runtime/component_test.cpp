@@ -119,7 +119,7 @@ TEST(Component, OneThatThrowsIsStoppedAndReportedAndTheOthersGoOn) {
   EXPECT_TRUE(status.failed);
   EXPECT_EQ(status.health, Health::error);
   EXPECT_THAT(status.reason, HasSubstr("the roof is on fire"));
-  EXPECT_THAT(harness.failures, ElementsAre(HasSubstr("/bad stopped")));
+  EXPECT_THAT(harness.failures(), ElementsAre(HasSubstr("/bad stopped")));
 }
 
 enum class Method { plain, genz };

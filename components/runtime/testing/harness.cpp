@@ -36,10 +36,16 @@ void Harness::add(std::unique_ptr<Component> component, const ComponentConfig& c
   environment.scheduler = executor_ ? static_cast<Scheduler*>(executor_.get()) : &inline_;
   environment.participant = participant_.get();
   environment.on_failure = [this](ComponentCore& core, const std::string& reason) {
-    failures.push_back(core.full_name() + " " + reason);
+    const std::lock_guard lock(mutex_);
+    failures_.push_back(core.full_name() + " " + reason);
   };
   component->core().connect(environment);
   components_.push_back(std::move(component));
+}
+
+std::vector<std::string> Harness::failures() const {
+  const std::lock_guard lock(mutex_);
+  return failures_;
 }
 
 void Harness::start() {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -57,9 +58,11 @@ class Harness {
   LocalBus bus;
   Clock clock;
   std::shared_ptr<LogSink> sink = std::make_shared<LogSink>(false);
-  std::vector<std::string> failures;
+  std::vector<std::string> failures() const;  // so far, in the order of the threads that met them
 
  private:
+  mutable std::mutex mutex_;
+  std::vector<std::string> failures_;  // guarded by mutex_
   std::unique_ptr<Participant> participant_;
   InlineScheduler inline_;
   std::unique_ptr<Executor> executor_;
