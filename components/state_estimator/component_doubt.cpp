@@ -1,4 +1,4 @@
-#include "components/state_estimator/front_end_doubt.hpp"
+#include "components/state_estimator/component_doubt.hpp"
 
 #include <algorithm>
 
