@@ -42,7 +42,9 @@ class Fidelity : public testing::Test {
     std::vector<Pose> result;
     for (RecordedSweep& sweep : read_sweeps(folder_)) {
       if (noise > 0.0f) {
-        for (Point3f& point : sweep.points) point += Point3f(jitter(), jitter(), jitter());
+        for (Point3f& point : sweep.points) {
+          for (float& coordinate : point.reshaped()) coordinate += jitter();  // in this order on every compiler
+        }
       }
       result.push_back(odometry.process(sweep.cloud()).pose);
     }
@@ -93,15 +95,22 @@ TEST_F(Fidelity, KissDrivesAsPublishedUntilChaosParts) {
   }
 }
 
+// After sweep 36 a millimetre of noise, or another processor's rounding, decides which minimum kiss falls into: ends
+// from 3 to 20 % (deciles of 120 runs, median 8.66). So the published end, 8.43 %, is one draw of many: it has to be an
+// ordinary one. A median of nine is within a quarter of it in two of three resamples only.
 TEST_F(Fidelity, KissEndsAsPublishedInTheMedian) {
   const std::vector<Pose> truth = poses("gt_end.tum");
+  constexpr std::size_t runs = 31;
   std::vector<double> ends;
-  for (unsigned seed = 0; seed < 9; ++seed) {
+  for (unsigned seed = 0; seed < runs; ++seed) {
     ends.push_back(trajectory_error(truth, run(Mode::kiss, true, 0.001f, seed)).end_percent);
   }
   std::sort(ends.begin(), ends.end());
-  within_a_quarter("kiss deskew median end [%]", ends[4],
-                   trajectory_error(truth, poses("reference_kiss_deskew.tum")).end_percent);
+  const double published = trajectory_error(truth, poses("reference_kiss_deskew.tum")).end_percent;
+  std::printf("  kiss deskew end [%%], quartiles %.2f %.2f %.2f, published %.2f\n", ends[runs / 4], ends[runs / 2],
+              ends[3 * runs / 4], published);
+  EXPECT_LT(ends[runs / 4], published);
+  EXPECT_GT(ends[3 * runs / 4], published);
 }
 
 // Issue: within 0.5 % and 0.05 m. Measured: 0.09 %, 0.014 m.
