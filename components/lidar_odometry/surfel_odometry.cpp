@@ -19,6 +19,13 @@ constexpr double settled_way = 2e-3;  // m, by which half a sweep's motion chang
 constexpr double mean_range = 10.0;   // m: turns radians into metres for that
 constexpr int lasting_changes = 5;    // of the twist, that its mean square is of
 
+Matrix6d start_information() {
+  Matrix6d information = Matrix6d::Zero();
+  information.diagonal() << Eigen::Vector3d::Constant(1.0 / (start_translation * start_translation)),
+      Eigen::Vector3d::Constant(1.0 / (start_rotation * start_rotation));
+  return information;
+}
+
 bool translation_observable(const Directions& directions) {
   return directions.observable[0] && directions.observable[1] && directions.observable[2];
 }
@@ -147,9 +154,7 @@ SurfelRegistrationResult SurfelOdometry::search_start(const SweepTask& task, con
   if (strength(at_rest) > required && at_rest.matched > surfels_.size() * 4 / 5) return at_rest;
   SurfelPrior loose = prior;
   loose.decides_weak_directions = false;
-  loose.information.setZero();
-  loose.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (start_translation * start_translation)),
-      Eigen::Vector3d::Constant(1.0 / (start_rotation * start_rotation));
+  loose.information = start_information();
   SurfelRegistrationResult best = at_rest;
   for (int i = -start_shifts; i <= start_shifts; ++i) {
     Pose guess = task.prediction;
@@ -181,8 +186,7 @@ SurfelRegistrationResult SurfelOdometry::redo_start(SweepTwist twist, std::size_
   const double half = 0.5 * (first_.sweep.times->last - first_.sweep.times->first);
   Vector6d used = first_.sweep.predicted;
   SurfelPrior prior;
-  prior.information.diagonal() << Eigen::Vector3d::Constant(1.0 / (start_translation * start_translation)),
-      Eigen::Vector3d::Constant(1.0 / (start_rotation * start_rotation));
+  prior.information = start_information();
   for (int round = 0; round < start_rounds && result.matched >= needed; ++round) {
     const Vector6d change = half * (result.twist - used);
     if (change.head<3>().norm() + mean_range * change.tail<3>().norm() < settled_way) break;

@@ -188,6 +188,13 @@ void Initialiser::refine(const Pyramid& image, int level, int iterations) {
   sigma_ = std::clamp(static_cast<float>(std::sqrt(system.scale)), config_.min_sigma, config_.max_sigma);
 }
 
+void Initialiser::refine_from_the_top(const Pyramid& image) {
+  for (int level = std::min(levels_ - 1, 3); level >= 0; --level) {
+    refine(image, level, iterations_at[static_cast<std::size_t>(level)]);
+    lean_on_neighbours();
+  }
+}
+
 void Initialiser::lean_on_neighbours() {
   for (Point& point : points_) {
     std::array<float, neighbours> depths;
@@ -244,10 +251,7 @@ Initialiser::Outcome Initialiser::add(const Pyramid& image) {
     }
     if (!scratch_.empty()) state_.b += median(scratch_);
   }
-  for (int level = std::min(levels_ - 1, 3); level >= 0; --level) {
-    refine(image, level, iterations_at[static_cast<std::size_t>(level)]);
-    lean_on_neighbours();
-  }
+  refine_from_the_top(image);
   measure(image);
   velocity_ = se3_log(state_.T_cw * before.T_cw.inverse());
   const bool finite = state_.T_cw.matrix().allFinite();
@@ -275,10 +279,7 @@ bool Initialiser::beaten_by_a_rival(const Pyramid& image) {
     state_.T_cw = Pose::Identity();
     state_.T_cw.translation()[i / 2] = i % 2 == 0 ? -step : step;
     for (Point& point : points_) point.d = point.anchor = 1.0F;
-    for (int level = std::min(levels_ - 1, 3); level >= 0; --level) {
-      refine(image, level, iterations_at[static_cast<std::size_t>(level)]);
-      lean_on_neighbours();
-    }
+    refine_from_the_top(image);
     sigma_ = sigma;
     store(image, rival_);
     if (!(rival_.energy < clearly_better * best_.energy)) continue;

@@ -71,6 +71,7 @@ class Initialiser {
   };
   System linearise(const Pyramid& image, const CameraState& state, int level, double damping);
   void refine(const Pyramid& image, int level, int iterations);
+  void refine_from_the_top(const Pyramid& image);
   void lean_on_neighbours();
   void find_neighbours();
   void measure(const Pyramid& image);
