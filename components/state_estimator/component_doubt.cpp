@@ -23,7 +23,9 @@ Doubt doubt_of(const ThermalHealth& message) {
   Doubt doubt;
   doubt.stamp_ns = to_time(message.header.stamp).time_since_epoch().count();
   constexpr float misfit = 1.3F;  // noise units: a right alignment leaves less than one
-  if (message.residual_rms > misfit) {
+  // Few points, and where they put the camera is not where the motion so far would: in fog they lie on what moves along.
+  constexpr std::uint32_t carried_along = ThermalHealth::FLAG_WEAK_TEXTURE | ThermalHealth::FLAG_PRIOR_DISAGREES;
+  if (message.residual_rms > misfit || (message.flags & carried_along) == carried_along) {
     doubt.value = 1.0;
   } else if (message.state != ThermalHealth::OK) {
     doubt.value = 0.75;

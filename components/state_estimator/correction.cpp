@@ -40,6 +40,16 @@ double share(const FilterState& state, const Innovation& innovation) {
   return t.cholesky.info() == Eigen::Success ? t.cholesky.solve(t.r).trace() / Rows : 0.0;
 }
 
+// Errors of position and heading belong together: a heading error turns the way to here about the origin. A correction
+// that moves the position along its error therefore moves what the heading's error does to it: e_p - J p e_psi stays
+// (right-invariant error on SE(2): Barrau and Bonnabel, "The invariant extended Kalman filter as a stable observer",
+// 2017). Left out, relative measurements seem to tell the heading, which they cannot.
+void move_errors(StateMatrix& p, int position, int heading, const Eigen::Vector2d& moved) {
+  const Eigen::Vector2d turned(-moved.y(), moved.x());  // J * moved
+  p.middleRows<2>(position).noalias() += turned * p.row(heading).eval();
+  p.middleCols<2>(position).noalias() += p.col(heading).eval() * turned.transpose();
+}
+
 template <int Rows>
 bool correct_rows(FilterState& state, const Innovation& innovation) {
   const Terms<Rows> t(state, innovation);
@@ -51,6 +61,11 @@ bool correct_rows(FilterState& state, const Innovation& innovation) {
   p.noalias() -= k * t.pht.transpose();
   const Eigen::Matrix<double, kStates, Rows> rest = k * t.r - p * t.h.transpose();
   p.noalias() += rest * k.transpose();
+  move_errors(p, kX, kYaw, x.segment<2>(kX) - state.x.segment<2>(kX));
+  for (int slot = 0; slot < kCloneSlots; ++slot) {
+    const int pose = clone_index(slot);
+    move_errors(p, pose, pose + 2, x.segment<2>(pose) - state.x.segment<2>(pose));
+  }
   if (!x.allFinite() || !p.allFinite()) return false;
   state.x = x;
   state.p = 0.5 * (p + p.transpose());
