@@ -54,12 +54,14 @@ double LidarOdometry::Impl::reference_time(const std::optional<TimeSpan>& times)
   return end ? times->last : 0.5 * (times->first + times->last);
 }
 
-// A stamp must be later than the last one. One that is not is refused, until a few in a row show a new time base.
+// A stamp must be later than the last one. One that is not is refused, until a few in a row show a new time base: one
+// that is set back by more than a pause in the old one may last. Less is what clouds that overtake each other look like.
 bool LidarOdometry::Impl::accept_stamp(std::int64_t stamp_ns) {
   if (!started || stamp_ns > estimate.stamp_ns) {
     refused_in_a_row = 0;
     return true;
   }
+  if (ns * static_cast<double>(estimate.stamp_ns - stamp_ns) <= config.max_gap_s) return false;
   refused_in_a_row = refused_in_a_row > 0 && stamp_ns > refused_stamp ? refused_in_a_row + 1 : 1;
   refused_stamp = stamp_ns;
   if (refused_in_a_row < stamps_to_believe) return false;

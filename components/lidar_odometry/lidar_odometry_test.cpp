@@ -191,6 +191,20 @@ TEST_P(EachMode, RefusesRepeatedAndReversedStamps) {
   EXPECT_LT(distance(odometry.estimate().pose, truth.ends.back()), 0.1);
 }
 
+// A transport that is not in order: four late clouds in a row are still late, however well they go on from each other.
+TEST_P(EachMode, RefusesCloudsThatWereOvertaken) {
+  const Drive truth = drive(hall(), 14);
+  LidarOdometry odometry(config_of(GetParam()));
+  std::vector<Status> statuses;
+  for (const int k : {0, 1, 2, 3, 4, 5, 10, 6, 7, 8, 9, 11, 12, 13}) {
+    statuses.push_back(odometry.process(truth.sweeps[static_cast<std::size_t>(k)].cloud()).status);
+  }
+  for (int i = 0; i < 14; ++i) {
+    EXPECT_EQ(statuses[static_cast<std::size_t>(i)] == Status::bad_stamp, i >= 7 && i <= 10) << i;
+  }
+  EXPECT_LT(distance(odometry.estimate().pose, truth.ends.back()), tolerance(GetParam()));
+}
+
 TEST_P(EachMode, BelievesAClockThatWasSetBackAfterThreeSweeps) {
   Drive truth = drive(hall(), 12);
   LidarOdometry odometry(config_of(GetParam()));

@@ -77,6 +77,7 @@ Verdict FrameGate::check(const Frame& frame, float noise) {
 bool FrameGate::newer(std::int64_t stamp_ns) {
   clock_set_back_ = false;
   if (has_stamp_ && stamp_ns <= last_stamp_ns_) {
+    if (1e-9 * static_cast<double>(last_stamp_ns_ - stamp_ns) <= config_.clock_step_s) return false;
     refused_run_ = refused_run_ > 0 && stamp_ns > refused_stamp_ns_ ? refused_run_ + 1 : 1;
     refused_stamp_ns_ = stamp_ns;
     if (refused_run_ < config_.clock_run) return false;

@@ -30,12 +30,13 @@ class FrameGate {
   struct Config {
     float frozen_fraction = 0.1F;  // of the temporal noise
     int clock_run = 5;             // frames refused for their stamps, each newer than the one before
+    double clock_step_s = 1.0;     // that the clock goes back by at least: less is a transport that is not in order
   };
   FrameGate(const CameraModel& model, const Config& config);
   // `noise` in counts. A frame that is not good changes nothing but the remembered stamp and picture.
   Verdict check(const Frame& frame, float noise);
   // The last frame was taken although it is older than the one before: clock_run frames in a row agreed with each other
-  // that the clock has been set back (or that one frame came from the future).
+  // that the clock has been set back by clock_step_s (or that one frame came from the future).
   bool clock_set_back() const { return clock_set_back_; }
 
  private:
