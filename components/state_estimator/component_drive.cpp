@@ -62,6 +62,7 @@ Recording SyntheticDrive::record() const {
   for (int i = 0; thermal_health && i * 40ms <= length; ++i) {
     auto message = std::make_shared<adit_msgs::msg::ThermalHealth>();
     message->header.stamp = to_stamp(Time(begin + i * 40ms));
+    message->active_points = 400;
     thermal_health(*message, 0.04 * i);
     recording.add("/thermal_health", Time(begin + i * 40ms + 14ms), std::move(message));
   }

@@ -8,10 +8,12 @@
 
 namespace adit::state_estimator {
 
-// Spectral densities of the white noises. Zero switches a term off.
+// Spectral densities of the white noises. Zero switches a term off. Those of the accelerations are a car's: with the
+// decay below they let the acceleration be 2.2 m/s^2 and the yaw acceleration 0.12 rad/s^2 (sqrt(density * tau / 2)),
+// brakes and bends included, which is what the covariance of an outage has to cover.
 struct ProcessNoise {
-  double jerk = 3.0;                // m^2/s^5, on the acceleration
-  double yaw_jerk = 0.1;            // rad^2/s^5, on the yaw acceleration
+  double jerk = 10.0;               // m^2/s^5, on the acceleration
+  double yaw_jerk = 0.03;           // rad^2/s^5, on the yaw acceleration
   double accel = 0.0;               // m^2/s^3, on the speed (constant-velocity model; slip)
   double yaw_accel = 0.0;           // rad^2/s^3, on the yaw rate
   double position = 0.0;            // m^2/s, on x and y (lateral motion, planar mismatch)

@@ -85,8 +85,8 @@ class StateEstimatorComponent final : public Component {
   Param<Switch> adaptive_noise_{*this, "adaptive_noise", Switch::preset, switches,
                                 "scale each odometry's covariance by what its innovations show"};
   // Of the vehicle; 0: the mode's own.
-  Param<double> jerk_{*this, "jerk", 0.0, Range{0.0, 1e4}, "spectral density [m^2/s^5]; a car 3, a walking robot 20"};
-  Param<double> yaw_jerk_{*this, "yaw_jerk", 0.0, Range{0.0, 1e4}, "the same of the heading [rad^2/s^5]; 0.1, 20"};
+  Param<double> jerk_{*this, "jerk", 0.0, Range{0.0, 1e4}, "spectral density [m^2/s^5]; a car 10, a walking robot 300"};
+  Param<double> yaw_jerk_{*this, "yaw_jerk", 0.0, Range{0.0, 1e4}, "the same of the heading [rad^2/s^5]; 0.03, 3000"};
   Param<double> slip_{*this, "slip", 0.0, Range{0.0, 10.0},
                       "motion that is not along the heading, density [m^2/s]: a walking robot sways, 1e-3"};
   Param<double> thermal_scale_sigma_{*this, "thermal_scale_sigma", 0.1, Range{1e-4, 10.0},

@@ -79,6 +79,13 @@ TEST(StateEstimatorComponent, CarriesTheFrontEndsDoubtsOfThemselves) {
   const Outcome misfit = run(drive);
   EXPECT_LT(error(misfit), 0.6);  // a second of coasting along the arc; fused, it would be 2.5 m
   EXPECT_EQ(misfit.sensor("thermal").reason, "its data is not fused");
+
+  drive.thermal_health = [](adit_msgs::msg::ThermalHealth& m, double t) {
+    m.active_points = t < 5.0 ? 400 : 60;
+  };  // fog
+  const Outcome few_points = run(drive);
+  EXPECT_LT(error(few_points), 0.6);
+  EXPECT_EQ(few_points.sensor("thermal").reason, "its data is not fused");
 }
 
 // The LiDAR looks along a featureless tunnel: its odometry sees half the speed, and its covariance says so. Its own
