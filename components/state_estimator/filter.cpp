@@ -8,6 +8,10 @@
 namespace adit::state_estimator {
 namespace {
 
+double square(double value) {
+  return value * value;
+}
+
 // A front end's own account of its scale. What its variance grows by, the scale has drifted since. When it falls, the
 // lengths were measured anew (LiDAR depth): the scale is then as at the start and has nothing to do with the one
 // before.
@@ -79,6 +83,8 @@ bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel
     observe_surprise(statistics.window, std::max(0.0, squared_distance(state, innovation)) / m.rows);
   }
   if (sensor.moves) innovation.covariance *= conflict_inflation(state, m.sensor, disagreement);
+  const bool disbelieved = m.motion.suspicion >= 1.0;  // by its own front end
+  if (disagreement.enabled && !disbelieved) innovation.covariance /= square(1.0 - m.motion.suspicion);
   const bool adapts = adaptation.enabled && sensor.adapts;
   if (adapts) innovation.covariance *= statistics.noise.factor;
   const double nis = squared_distance(state, innovation);
@@ -91,7 +97,6 @@ bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel
   ++statistics.examined;
   statistics.nis_per_dof_sum += nis / m.rows;
   const bool moving = std::abs(state.x(kSpeed)) > 0.1 || std::abs(state.x(kYawRate)) > 0.03;
-  const bool disbelieved = m.motion.suspicion >= 1.0;  // by its own front end
   if (disagreement.enabled && (statistics.is_distrusted || disbelieved || (m.motion.frozen && moving))) {
     ++statistics.distrusted;
     return false;
