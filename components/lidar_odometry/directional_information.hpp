@@ -24,6 +24,7 @@ struct Constraint {
   Eigen::Vector3f source_normal;  // unit
   float weight = 0.0f;            // 1/m^2; 0: no match
   std::uint16_t cluster = 0;
+  float time = 0.0f;  // s, of the point, from the instant of the pose
 };
 
 // Independent directions of a Hessian: three translations, each with the rotation that goes along, and three pure
@@ -33,6 +34,7 @@ struct Directions {
   Matrix6d to_coordinates;                  // inverse of basis
   Vector6d curvature;                       // of the Hessian along each column
   Vector6d information = Vector6d::Zero();  // effective, 1/m^2 and 1/rad^2; <= 0: none
+  Vector6d claim = Vector6d::Zero();        // of it or of the curvature, what may be handed to a filter; >= 0
   std::array<bool, 6> observable{};
 };
 
@@ -46,7 +48,7 @@ class DirectionalInformation {
   // The Hessian and gradient with each direction scaled by how far it is observed, 0 to 1.
   void attenuate(const Directions& directions, Matrix6d& hessian, Vector6d& gradient) const;
 
-  // What may be handed to a filter: effective information, nothing along directions without.
+  // What may be handed to a filter: the claims, nothing along directions without.
   static Matrix6d exported(const Directions& directions);
   // The gradient of the same match that goes with it: -exported^-1 times this is where the match alone would go.
   static Vector6d exported_gradient(const Directions& directions, const Vector6d& gradient);

@@ -28,6 +28,8 @@ struct Prior {
   // Poses of the sensor during this sweep in any fixed frame, from its first to its last point, e.g. of an IMU, for the
   // motion compensation instead of a twist. Not kept. Poses that do not reach over the sweep are ignored and counted.
   std::span<const StampedPose> sweep;
+  // What those poses are wrong by, as a twist in the sensor frame that is constant within the sweep [m/s; rad/s].
+  Matrix6d sweep_covariance = Matrix6d::Zero();
 };
 
 // Two increments that know of each other nothing, as one: each direction by its information, the sweep of the first.

@@ -22,8 +22,10 @@ constexpr double coarse_velocity = 0.5;                 // m/s, sigma of one tha
 constexpr double contradiction = 100.0;                 // squared Mahalanobis distance of six dimensions: ten sigma
 constexpr int contradictions_to_believe = 5;
 constexpr std::int64_t silence_ns = 5'000'000'000;
+constexpr int lasting_surprises = 20;  // sweeps that the mean square of what was not expected is of
 
 constexpr double most_position = 0.05, most_rotation = 0.01;  // m, rad: of the pose against the local map
+constexpr double known_position = 0.3;                        // m, sigma of a motion that is more than a guess
 
 // Places of the errors in the covariance.
 constexpr int position = 0, rotation = 3, velocity = 6, gravity = 9, bias = 12;
@@ -49,7 +51,7 @@ InertialPredictor::InertialPredictor(const InertialConfig& config) : config_(con
 
 void InertialPredictor::clear() {
   samples_.clear();
-  refused_in_a_row_ = contradictions_in_a_row_ = 0;
+  refused_in_a_row_ = contradictions_in_a_row_ = surprises_ = 0;
   state_.reset();
   predicted_.reset();
   last_ns_ = silent_until_ns_ = 0;
@@ -235,6 +237,36 @@ void InertialPredictor::sample_sweep(const SweepStamps& sweep) {
   }
 }
 
+// What the poses within a sweep are wrong by, as a constant twist of the LiDAR: by what the last poses found differed
+// from those expected, or, before there were any, by what the filter knows of itself. The rotation also by the noise of
+// the gyroscope and by what its samples leave open between them. Both show in their fourth differences, which a motion
+// does not have that the samples resolve: of white noise they are sqrt(70) times its deviation. Its integral over a
+// sweep is a random walk, its end is off the mean of the way by a third of its variance; a constant rate that does the
+// same to the end has half a sweep to do it. Precondition: predicted_.
+Matrix6d InertialPredictor::sweep_covariance(const SweepStamps& sweep) const {
+  Matrix6d twist = Matrix6d::Zero();
+  const double duration = seconds(sweep.first_ns, sweep.last_ns);
+  if (!(duration > 0.0)) return twist;
+  Eigen::Vector3d angle = Eigen::Vector3d::Zero();  // variance at the end
+  for (std::size_t last = usable_ - 1; last >= 4 && samples_[last].stamp_ns >= sweep.first_ns; --last) {
+    const double dt = seconds(samples_[last - 1].stamp_ns, samples_[last].stamp_ns);
+    const Eigen::Vector3d difference = samples_[last].rate - 4.0 * samples_[last - 1].rate +
+                                       6.0 * samples_[last - 2].rate - 4.0 * samples_[last - 3].rate +
+                                       samples_[last - 4].rate;
+    angle += dt * dt / 70.0 * difference.cwiseAbs2();
+  }
+  if (surprises_ > 0) {
+    twist.diagonal() = surprise2_;
+  } else {
+    const Covariance& p = predicted_->covariance;
+    twist.topLeftCorner<3, 3>() = p.block<3, 3>(velocity, velocity);
+    twist.bottomRightCorner<3, 3>() = p.block<3, 3>(bias, bias);
+  }
+  twist.diagonal().tail<3>() += 4.0 / (3.0 * duration * duration) * angle;
+  const Matrix6d to_lidar = se3_adjoint(config_.lidar_from_imu);
+  return to_lidar * twist * to_lidar.transpose();
+}
+
 std::optional<Prior> InertialPredictor::predict(const SweepStamps& sweep) {
   predicted_.reset();
   if (sweep.reference_ns < silent_until_ns_) return std::nullopt;
@@ -265,6 +297,7 @@ std::optional<Prior> InertialPredictor::predict(const SweepStamps& sweep) {
 
   Prior prior;
   prior.sweep = poses_;
+  prior.sweep_covariance = sweep_covariance(sweep);
   if (first) return prior;
   const Pose& mounting = config_.lidar_from_imu;
   Pose imu = Pose::Identity();
@@ -298,6 +331,17 @@ bool InertialPredictor::contradicts(const Vector6d& found, const Matrix6d& expec
   return ++contradictions_in_a_row_ >= contradictions_to_believe;
 }
 
+void InertialPredictor::note_surprise(const Vector6d& found, const Matrix6d& expected, double elapsed) {
+  // A velocity that was open says nothing of how good the next ones are.
+  if (!(elapsed > 0.0) || expected.diagonal().head<3>().maxCoeff() > known_position * known_position) {
+    surprises_ = 0;
+    return;
+  }
+  surprises_ = std::min(surprises_ + 1, lasting_surprises);
+  if (surprises_ == 1) surprise2_.setZero();
+  surprise2_ += ((found / elapsed).cwiseAbs2() - surprise2_) / surprises_;
+}
+
 void InertialPredictor::correct(const Estimate& estimate) {
   if (estimate.status == Status::bad_stamp || estimate.status == Status::bad_cloud) return;
   const Pose& mounting = config_.lidar_from_imu;
@@ -307,6 +351,7 @@ void InertialPredictor::correct(const Estimate& estimate) {
   last_twist_.reset();
   if (found) last_twist_ = estimate.twist;
   if (!predicted_) {
+    surprises_ = 0;
     last_ns_ = estimate.stamp_ns;
     if (state_ && found) {
       state_->rotation = imu.linear();
@@ -319,15 +364,17 @@ void InertialPredictor::correct(const Estimate& estimate) {
   }
   state_ = *predicted_;
   predicted_.reset();
+  const double elapsed = seconds(last_ns_, estimate.stamp_ns);
   last_ns_ = estimate.stamp_ns;
   if (found) {
     Covariance& p = state_->covariance;
     Vector6d shift;
     shift << imu.translation() - state_->position, so3_log(state_->rotation.transpose() * imu.linear());
     const Matrix6d prior = p.topLeftCorner<6, 6>();
+    note_surprise(shift, prior, elapsed);
     if (contradicts(shift, prior)) {
       silent_until_ns_ = last_ns_ + silence_ns;
-      contradictions_in_a_row_ = 0;
+      contradictions_in_a_row_ = surprises_ = 0;
       state_.reset();
       return;
     }

@@ -95,6 +95,8 @@ class InertialPredictor {
   void set_velocity(State& state, const Vector6d& lidar_twist) const;
   void rebase(State& state) const;
   void sample_sweep(const SweepStamps& sweep);
+  Matrix6d sweep_covariance(const SweepStamps& sweep) const;
+  void note_surprise(const Vector6d& found, const Matrix6d& expected, double elapsed);
   bool contradicts(const Vector6d& found, const Matrix6d& expected);
 
   InertialConfig config_;
@@ -110,6 +112,9 @@ class InertialPredictor {
   std::optional<Vector6d> last_twist_;  // of the LiDAR, from two registered sweeps
   int contradictions_in_a_row_ = 0;
   std::int64_t silent_until_ns_ = 0;
+  // Mean square of what the last motions found differed from those expected, as twists [(m/s)^2, (rad/s)^2].
+  Vector6d surprise2_ = Vector6d::Zero();
+  int surprises_ = 0;               // that are in it
   std::vector<StampedPose> poses_;  // within the sweep
   InertialCounters counters_;
 };

@@ -15,7 +15,8 @@ constexpr double ns = 1e-9;
 constexpr int stamps_to_believe = 3;
 
 bool usable(const Prior& prior) {
-  return is_rigid(prior.pose) && prior.information.allFinite() && (!prior.twist || prior.twist->allFinite());
+  return is_rigid(prior.pose) && prior.information.allFinite() && prior.sweep_covariance.allFinite() &&
+         (!prior.twist || prior.twist->allFinite());
 }
 
 std::unique_ptr<Pipeline> make_pipeline(const Config& config, WorkerPool& pool) {
@@ -122,6 +123,7 @@ void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
   if (prior != nullptr && !prior->sweep.empty() && config.deskew && task.times) {
     if (follows(prior->sweep, cloud.stamp_ns, *task.times)) {
       task.sampled = SweepMotion(prior->sweep, cloud.stamp_ns, *task.times, task.reference_time);
+      task.sampled_covariance = prior->sweep_covariance;
     } else {
       ++estimate.total.bad_priors;
     }

@@ -17,12 +17,13 @@ struct SweepTask {
   double dt = 0.0;                               // s since the instant of the last pose; 0 for the first sweep
   Pose last = Pose::Identity();
   Pose prediction = Pose::Identity();
-  Vector6d twist = Vector6d::Zero();            // predicted, sensor frame
-  Matrix6d information = Matrix6d::Zero();      // of the prediction, if it came from outside; right perturbation
-  bool external = false;                        // the prediction came from outside
-  std::optional<Pose> coasting = std::nullopt;  // where the velocity of the last sweeps leads, if it is known
-  bool external_twist = false;                  // the twist came from outside
-  SweepMotion sampled = {};                     // within the sweep, if it came from outside; else not moving()
+  Vector6d twist = Vector6d::Zero();               // predicted, sensor frame
+  Matrix6d information = Matrix6d::Zero();         // of the prediction, if it came from outside; right perturbation
+  bool external = false;                           // the prediction came from outside
+  std::optional<Pose> coasting = std::nullopt;     // where the velocity of the last sweeps leads, if it is known
+  bool external_twist = false;                     // the twist came from outside
+  SweepMotion sampled = {};                        // within the sweep, if it came from outside; else not moving()
+  Matrix6d sampled_covariance = Matrix6d::Zero();  // of a twist that it is wrong by
 };
 
 // Fills status, pose, information, localizability and scan of the estimate; the pose in the local map's frame.

@@ -78,9 +78,7 @@ SurfelPrior SurfelOdometry::prior_of(const SweepTask& task) const {
     prior.pose.linear() = orthonormalized(so3_exp(step.tail<3>()) * prior.pose.linear());
     return prior;
   }
-  // A prior that leaves a direction open must not leave the solution open: 1 m, 0.2 rad.
-  prior.information.diagonal().head<3>().array() += 1.0;
-  prior.information.diagonal().tail<3>().array() += 25.0;
+  prior.information.diagonal() += open_information();
   return prior;
 }
 
@@ -124,22 +122,24 @@ void SurfelOdometry::note_twist(const Vector6d& twist, bool sampled, double dt) 
   last_twist_ = twist;
 }
 
-// What the motion within the sweep is wrong by displaces the pose. Of a sweep compensated with one twist, its usual
-// change from sweep to sweep tells the variance, of half a sweep at both ends of a motion: F. Poses of an IMU leave the
-// least. Information I becomes (1 - I (I + F^-1)^-1) I, the inverse of I^-1 + F, also of directions that the match does
-// not know. Returns the factor.
-Matrix6d SurfelOdometry::widened(const Matrix6d& match, const SweepTask& task) const {
-  constexpr double least_translation = 5e-4, least_rotation = 5e-5;  // m, rad
-  Vector6d variance = Vector6d::Zero();
-  if (task.times && !task.sampled.moving()) {
-    const double half = 0.5 * (task.times->last - task.times->first);
-    variance = 2.0 * half * half * twist_change2_;
+// The noise of a match is that of one pose; a motion has two ends, so its covariance is twice. What the motion within
+// the sweep is wrong by displaces the pose, too: of a sweep compensated with one twist, that twist's usual change from
+// sweep to sweep tells the variance; of poses from outside, they do. With the covariance F of that displacement and the
+// information I of the match: (2 I^-1 + 2 F)^-1 = (1 - I (I + F^-1)^-1) I / 2, also of directions that the match does
+// not know. Returns the factor before I. All in the sensor frame.
+Matrix6d SurfelOdometry::widened(const Matrix6d& match, const Matrix6d& lag, const SweepTask& task) const {
+  constexpr double least_translation = 1e-4, least_rotation = 1e-5;  // m, rad: of coordinates in single precision
+  Matrix6d twist = Matrix6d::Zero();
+  if (task.sampled.moving()) {
+    twist = task.sampled_covariance;
+  } else if (task.times) {
+    twist = twist_change2_.asDiagonal();
   }
-  variance.head<3>().array() += least_translation * least_translation;
-  variance.tail<3>().array() += least_rotation * least_rotation;
-  Matrix6d sum = match;
-  sum.diagonal() += variance.cwiseInverse();
-  return Matrix6d::Identity() - sum.ldlt().solve(match).transpose();
+  Matrix6d displacement = lag * twist * lag.transpose();
+  displacement.diagonal().head<3>().array() += least_translation * least_translation;
+  displacement.diagonal().tail<3>().array() += least_rotation * least_rotation;
+  const Matrix6d sum = match + displacement.ldlt().solve(Matrix6d::Identity());
+  return 0.5 * (Matrix6d::Identity() - sum.ldlt().solve(match).transpose());
 }
 
 // The second sweep without any knowledge of the velocity: if the match at rest does not convince, others along the
@@ -261,7 +261,7 @@ void SurfelOdometry::process(const SweepTask& task, Estimate& estimate) {
     const Matrix6d match = turn.transpose() * DirectionalInformation::exported(result.directions) * turn;
     const Vector6d slope =
         turn.transpose() * DirectionalInformation::exported_gradient(result.directions, result.gradient);
-    const Matrix6d share = widened(match, task);
+    const Matrix6d share = widened(match, turn.transpose() * result.lag * turn, task);
     estimate.information = share * match;
     estimate.information = 0.5 * (estimate.information + estimate.information.transpose().eval());
     estimate.gradient = share * slope;

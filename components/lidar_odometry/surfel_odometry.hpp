@@ -25,7 +25,7 @@ class SurfelOdometry final : public Pipeline {
   SweepTwist twist_of(const SweepTask& task) const;
   bool position_known(const SweepTask& task) const;
   void note_twist(const Vector6d& twist, bool sampled, double dt);
-  Matrix6d widened(const Matrix6d& match, const SweepTask& task) const;
+  Matrix6d widened(const Matrix6d& match, const Matrix6d& lag, const SweepTask& task) const;
   SurfelRegistrationResult search_start(const SweepTask& task, const SurfelPrior& prior, const SweepTwist& twist,
                                         std::size_t needed, const SurfelRegistrationResult& at_rest);
   void keep_first(const SweepTwist& twist, const Pose& pose, const SweepMotion& sampled);

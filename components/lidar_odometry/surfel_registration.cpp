@@ -119,6 +119,7 @@ void SurfelRegistration::accumulate(const Pose& pose, std::size_t begin, std::si
   const auto noise2 = static_cast<float>(config_.residual_sigma * config_.residual_sigma);
   const auto kernel2 = static_cast<float>(kernel * kernel);
   const auto scale2 = static_cast<float>(scale_ * scale_);
+  const auto reference = static_cast<float>(reference_time_);
   for (std::size_t i = begin; i < end; ++i) {
     Constraint& constraint = constraints_[i];
     constraint.weight = 0.0f;
@@ -132,7 +133,7 @@ void SurfelRegistration::accumulate(const Pose& pose, std::size_t begin, std::si
     const float r = n.dot(e) - 0.5f * match.offset;
     const float k = kernel2 / (kernel2 + r * r);
     const float w = k * k / ((noise2 + match.variance) * scale2);
-    constraint = {y, n_m, n_s, w, compensated_[i].cluster};
+    constraint = {y, n_m, n_s, w, compensated_[i].cluster, compensated_[i].time - reference};
     j.head<3>() = n;
     j.segment<3>(3) = y.cross(n);
     const Eigen::Matrix<float, 8, 1> a = w * j;
@@ -173,6 +174,8 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
   result.twist = sweep.predicted;
   Pose pose = guess;
   double moved = 0.0;  // m, by the last association
+  Matrix6d last_hessian = Matrix6d::Zero();
+  reference_time_ = sweep.times ? sweep.reference_time : 0.0;
   for (int outer = 0; outer < usual_associations || (outer < max_associations && moved > settled_step); ++outer) {
     moved = 0.0;
     if (result.associations > 0) result.twist = sweep.refined(pose, result.twist);
@@ -190,6 +193,7 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
       result.rms_residual = std::sqrt(sums.squared / std::max(sums.weight, 1e-12));
       if (inner == 0) result.directions = information_.analyse(sums.hessian, constraints_);
       const Matrix6d match_hessian = sums.hessian;
+      last_hessian = match_hessian;
       const Vector6d match_gradient = sums.gradient;
       if (prior.decides_weak_directions) information_.attenuate(result.directions, sums.hessian, sums.gradient);
       Vector6d error;
@@ -212,7 +216,31 @@ SurfelRegistrationResult SurfelRegistration::align(std::span<const Surfel> surfe
   }
   result.pose = pose;
   place(pose);
+  result.lag = lag(last_hessian);
   return result;
+}
+
+// A twist of `t` moves a point of time s after the pose's instant by s times what a motion t of the pose would move it
+// by. So the residuals change by s J t, and the solution by -H^-1 sum(w J s J^T) t.
+Matrix6d SurfelRegistration::lag(const Matrix6d& hessian) const {
+  Matrix6d total = Matrix6d::Zero();
+  for (std::size_t begin = 0; begin < constraints_.size(); begin += chunk_size) {
+    Eigen::Matrix<float, 8, 6> sum = Eigen::Matrix<float, 8, 6>::Zero();
+    Eigen::Matrix<float, 8, 1> j = Eigen::Matrix<float, 8, 1>::Zero();
+    for (std::size_t i = begin; i < std::min(begin + chunk_size, constraints_.size()); ++i) {
+      const Constraint& c = constraints_[i];
+      if (c.weight == 0.0f) continue;
+      const Eigen::Vector3f n = 0.5f * (c.map_normal + c.source_normal);
+      j.head<3>() = n;
+      j.segment<3>(3) = c.lever.cross(n);
+      const Eigen::Matrix<float, 8, 1> a = -c.time * c.weight * j;
+      for (int column = 0; column < 6; ++column) sum.col(column) += j[column] * a;
+    }
+    total += sum.topRows<6>().cast<double>();
+  }
+  Matrix6d regular = hessian;
+  regular.diagonal() += open_information();
+  return regular.ldlt().solve(total);
 }
 
 void SurfelRegistration::place(const Pose& pose) {

@@ -25,6 +25,11 @@ struct SurfelPrior {
   bool decides_weak_directions = true;
 };
 
+// Of directions that nothing else tells of: 1 m, 0.2 rad. No solution is left open.
+inline Vector6d open_information() {
+  return (Vector6d() << Eigen::Vector3d::Constant(1.0), Eigen::Vector3d::Constant(25.0)).finished();
+}
+
 // The motion within the sweep: predicted, and how much of the estimated one replaces it at each association.
 // The estimated translation is that from the middle of the last sweep to the middle of this one. Poses at the ends of
 // sweeps would feed back: a wrong velocity displaces them, they make the next velocity wrong, and where the evidence
@@ -59,6 +64,9 @@ struct SurfelRegistrationResult {
   Vector6d twist = Vector6d::Zero();     // that the sweep was compensated with
   Directions directions;                 // in map axes
   Vector6d gradient = Vector6d::Zero();  // of the match alone, at the result, map axes
+  // s: what a twist that the sweep was wrongly compensated with displaces the match by, in map axes. About half a
+  // sweep.
+  Matrix6d lag = Matrix6d::Zero();
   std::size_t matched = 0;
   int associations = 0, solves = 0;
   double median_residual = 0.0;  // m, absolute
@@ -94,6 +102,7 @@ class SurfelRegistration {
   double median_residual();
   void accumulate(const Pose& pose, std::size_t begin, std::size_t end, double kernel, Sums& sums);
   Sums linearise(const Pose& pose, double kernel, WorkerPool& pool);
+  Matrix6d lag(const Matrix6d& hessian) const;
 
   SurfelConfig config_;
   DirectionalInformation information_;
@@ -110,7 +119,8 @@ class SurfelRegistration {
   std::vector<float> residuals_;
   std::vector<Sums> chunks_;
   std::vector<MapSurfel> placed_;
-  double scale_ = 1.0;  // of the residuals against the expected noise
+  double scale_ = 1.0;           // of the residuals against the expected noise
+  double reference_time_ = 0.0;  // s after the stamp: the instant of the pose
 };
 
 }  // namespace adit::lidar_odometry
