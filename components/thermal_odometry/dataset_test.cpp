@@ -61,7 +61,8 @@ TEST(SyntheticTunnel, MonocularMatchesThePublishedMethod) {
             << odometry.estimate().counters.keyframes << ", " << spent / 110 << " ms CPU a frame\n";
   EXPECT_LE(sim.rmse, 0.014);
   EXPECT_LE(relative, 0.005);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // the figure of code that is not instrumented
+  // The figure is the development machine's, of code that is not instrumented; an emulated ARM takes ten times that.
+#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   EXPECT_LE(spent / 110, 25.0);
 #endif
 }
