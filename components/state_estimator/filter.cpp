@@ -8,10 +8,6 @@
 namespace adit::state_estimator {
 namespace {
 
-double square(double value) {
-  return value * value;
-}
-
 // A front end's own account of its scale. What its variance grows by, the scale has drifted since. When it falls, the
 // lengths were measured anew (LiDAR depth): the scale is then as at the start and has nothing to do with the one
 // before.

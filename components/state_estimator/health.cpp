@@ -14,10 +14,6 @@ bool has_speed(const MotionWindow& window, const DisagreementConfig& config) {
   return window.speed_stamp_ns != kNoStamp && seconds_between(window.speed_stamp_ns, window.stamp_ns) <= config.fresh_s;
 }
 
-double square(double value) {
-  return value * value;
-}
-
 double speed_distance(const MotionWindow& a, const MotionWindow& b, const DisagreementConfig& config) {
   if (!has_speed(a, config) || !has_speed(b, config)) return 0.0;
   const double model =

@@ -12,10 +12,6 @@ namespace {
 // A motion over a longer interval says nothing about the speed of now: it is not compared with other sensors'.
 constexpr double kComparable = 1.0;  // s
 
-double square(double value) {
-  return value * value;
-}
-
 // Body motion in levelled axes of the heading at `from`.
 struct PlanarMotion {
   Pose body = Pose::Identity();                        // motion of base_link

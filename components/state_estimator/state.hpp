@@ -41,6 +41,9 @@ using StateMatrix = Eigen::Matrix<double, kStates, kStates>;
 inline constexpr int clone_index(int slot) {
   return kFirstClone + 3 * slot;
 }
+inline double square(double value) {
+  return value * value;
+}
 inline double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * 1e-9;
 }

@@ -6,13 +6,6 @@
 #include "components/state_estimator/initial_state.hpp"
 
 namespace adit::state_estimator {
-namespace {
-
-double square(double value) {
-  return value * value;
-}
-
-}  // namespace
 
 Result<std::unique_ptr<StateEstimator>> StateEstimator::create(const Config& config) {
   if (Result<void> ok = check(config); !ok) return ok.error();
