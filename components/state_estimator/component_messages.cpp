@@ -110,6 +110,8 @@ void fill(const Estimate& estimate, const Status& status, const Arrivals& arriva
   out.mode = mode_of(status);
   out.thermal_scale = status.thermal_scale;
   out.thermal_scale_sigma = status.thermal_scale_sigma;
+  out.thermal_delay = status.thermal_delay;
+  out.thermal_delay_sigma = status.thermal_delay_sigma;
   out.replays = status.replays;
   const double heading = yaw(estimate.pose.linear());
   const Eigen::Vector2d ahead(std::cos(heading), std::sin(heading)), left(-ahead.y(), ahead.x());

@@ -38,6 +38,7 @@ Config Config::paper() {
                                  .yaw = 1e-6,
                                  .scale = 0.0,
                                  .thermal_yaw_bias = 0.0,
+                                 .thermal_delay = 0.0,
                                  .gyro_bias = 0.0,
                                  .accel_bias = 0.0,
                                  .diagonal = true};
@@ -67,6 +68,7 @@ Config Config::predecessor() {
                                  .yaw = 1e-6,
                                  .scale = 0.0,
                                  .thermal_yaw_bias = 0.0,
+                                 .thermal_delay = 0.0,
                                  .gyro_bias = 0.0,
                                  .accel_bias = 0.0,
                                  .diagonal = false};
@@ -81,7 +83,7 @@ Config Config::standard() {
   Config c;
   c.odometries = {lidar(), thermal()};
   OdometryConfig& t = c.odometries[1].odometry;
-  t.calibration = {.scale = true, .yaw_bias = true};
+  t.calibration = {.scale = true, .yaw_bias = true, .delay = true};
   return c;
 }
 
@@ -108,14 +110,14 @@ Result<void> check(const Config& c) {
   }
   const ProcessNoise& n = c.process.noise;
   for (const double density : {n.jerk, n.yaw_jerk, n.accel, n.yaw_accel, n.position, n.yaw, n.scale, n.thermal_yaw_bias,
-                               n.gyro_bias, n.accel_bias}) {
+                               n.thermal_delay, n.gyro_bias, n.accel_bias}) {
     if (!(density >= 0.0) || !std::isfinite(density)) return wrong("noise densities must be zero or positive");
   }
   if (!(c.process.max_step_s > 0.0)) return wrong("max_step_s must be positive");
   if (!(c.replay.history_s > 0.0)) return wrong("history_s must be positive");
   const InitialState& i = c.initial;
   for (const double sigma : {i.sigma_position, i.sigma_yaw, i.sigma_speed, i.sigma_accel, i.sigma_yaw_rate,
-                             i.sigma_yaw_accel, i.sigma_scale, i.sigma_thermal_yaw_bias}) {
+                             i.sigma_yaw_accel, i.sigma_scale, i.sigma_thermal_yaw_bias, i.sigma_thermal_delay}) {
     if (!(sigma >= 0.0) || !std::isfinite(sigma)) return wrong("initial deviations must be zero or positive");
   }
   return {};

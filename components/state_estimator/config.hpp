@@ -52,7 +52,7 @@ struct InitialState {
   double x = 0.0, y = 0.0, yaw = 0.0, speed = 0.0;
   double sigma_position = 0.001, sigma_yaw = 1e-4;  // the start defines odom: an exact pose, but for its instant
   double sigma_speed = 1.0, sigma_accel = 1.0, sigma_yaw_rate = 0.2, sigma_yaw_accel = 0.5;
-  double sigma_scale = 0.1, sigma_thermal_yaw_bias = 0.002;
+  double sigma_scale = 0.1, sigma_thermal_yaw_bias = 0.002, sigma_thermal_delay = 0.03;
 };
 
 struct Config {

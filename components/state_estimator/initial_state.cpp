@@ -24,6 +24,7 @@ FilterState initial_state(const Config& config, std::int64_t stamp_ns) {
   for (const OdometrySensor& o : config.odometries) {
     if (o.odometry.calibration.scale) sigma(kScale, initial.sigma_scale);
     if (o.odometry.calibration.yaw_bias) sigma(kThermalYawBias, initial.sigma_thermal_yaw_bias);
+    if (o.odometry.calibration.delay) sigma(kThermalDelay, initial.sigma_thermal_delay);
   }
   if (config.imu.enabled) sigma(kGyroBias, config.imu.yaw_rate_bias);
   if (config.imu.enabled && config.imu.use_acceleration) sigma(kAccelBias, config.imu.acceleration_bias);
@@ -33,7 +34,7 @@ FilterState initial_state(const Config& config, std::int64_t stamp_ns) {
 FilterState without_motion(const FilterState& old, const Config& config, std::int64_t stamp_ns) {
   FilterState fresh = initial_state(config, stamp_ns);
   fresh.x(kSpeed) = 0.0;
-  constexpr int kept[] = {kX, kY, kYaw, kScale, kThermalYawBias, kGyroBias, kAccelBias};
+  constexpr int kept[] = {kX, kY, kYaw, kScale, kThermalYawBias, kThermalDelay, kGyroBias, kAccelBias};
   for (const int i : kept) {
     fresh.x(i) = old.x(i);
     for (const int j : kept) fresh.p(i, j) = old.p(i, j);

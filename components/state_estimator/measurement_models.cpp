@@ -1,18 +1,44 @@
 #include "components/state_estimator/measurement_models.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace adit::state_estimator {
+namespace {
+
+// How fast speed and yaw rate change, and d(that) / d(acceleration state). An acceleration that may as well be noise
+// must not seem to tell a delay: it counts by the share that is known of it.
+struct Change {
+  double rate, share;
+  Change(const FilterState& state, int acceleration) {
+    const double power = square(state.x(acceleration));
+    share = power > 0.0 ? power / (power + std::max(0.0, state.p(acceleration, acceleration))) : 0.0;
+    rate = share * state.x(acceleration);
+  }
+};
+
+}  // namespace
 
 Linearization SpeedAndYawRate::linearize(const FilterState& state, const Measurement& m) const {
   Linearization l;
   const double scale = calibration_.scale ? std::exp(state.x(kScale)) : 1.0;
   const double bias = calibration_.yaw_bias ? state.x(kThermalYawBias) : 0.0;
-  l.innovation(0) = m.value(0) - scale * state.x(kSpeed);
-  l.innovation(1) = m.value(1) - state.x(kYawRate) - bias;
+  double speed = state.x(kSpeed), yaw_rate = state.x(kYawRate);
+  if (calibration_.delay) {
+    const double delay = state.x(kThermalDelay);
+    const Change along(state, kAccel), turn(state, kYawAccel);
+    speed -= delay * along.rate;
+    yaw_rate -= delay * turn.rate;
+    l.jacobian(0, kAccel) = -scale * delay * along.share;
+    l.jacobian(1, kYawAccel) = -delay * turn.share;
+    l.jacobian(0, kThermalDelay) = -scale * along.rate;
+    l.jacobian(1, kThermalDelay) = -turn.rate;
+  }
+  l.innovation(0) = m.value(0) - scale * speed;
+  l.innovation(1) = m.value(1) - yaw_rate - bias;
   l.jacobian(0, kSpeed) = scale;
   l.jacobian(1, kYawRate) = 1.0;
-  if (calibration_.scale) l.jacobian(0, kScale) = scale * state.x(kSpeed);
+  if (calibration_.scale) l.jacobian(0, kScale) = scale * speed;
   if (calibration_.yaw_bias) l.jacobian(1, kThermalYawBias) = 1.0;
   return l;
 }
@@ -25,10 +51,24 @@ Linearization PlanarRelativePose::linearize(const FilterState& state, const Meas
   const double c = std::cos(state.x(anchor + 2)), s = std::sin(state.x(anchor + 2));
   Eigen::Matrix2d to_anchor;
   to_anchor << c, s, -s, c;
-  const Eigen::Vector2d moved = to_anchor * (state.x.segment<2>(kX) - state.x.segment<2>(anchor));
+  Eigen::Vector2d moved = to_anchor * (state.x.segment<2>(kX) - state.x.segment<2>(anchor));
+  double turned = state.x(kYaw) - state.x(anchor + 2);
   Linearization l;
+  if (calibration_.delay) {  // the same span, begun that much earlier
+    const double delay = state.x(kThermalDelay);
+    const Change along(state, kAccel), turn(state, kYawAccel);
+    const Eigen::Vector2d ahead(std::cos(turned), std::sin(turned));
+    const double earlier = delay * span * along.rate;
+    moved -= earlier * ahead;
+    turned -= delay * span * turn.rate;
+    l.jacobian.block<2, 1>(0, kYaw) = scale * earlier * Eigen::Vector2d(ahead.y(), -ahead.x());
+    l.jacobian.block<2, 1>(0, kAccel) = -scale * delay * span * along.share * ahead;
+    l.jacobian(2, kYawAccel) = -delay * span * turn.share;
+    l.jacobian.block<2, 1>(0, kThermalDelay) = -scale * span * along.rate * ahead;
+    l.jacobian(2, kThermalDelay) = -span * turn.rate;
+  }
   l.innovation.head<2>() = m.value.head<2>() - scale * moved;
-  l.innovation(2) = wrap_angle(m.value(2) - (state.x(kYaw) - state.x(anchor + 2)) - bias * span);
+  l.innovation(2) = wrap_angle(m.value(2) - turned - bias * span);
   l.jacobian.block<2, 2>(0, kX) = scale * to_anchor;
   l.jacobian.block<2, 2>(0, anchor) = -scale * to_anchor;
   l.jacobian(0, anchor + 2) = scale * moved.y();

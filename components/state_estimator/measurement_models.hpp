@@ -10,6 +10,7 @@ namespace adit::state_estimator {
 struct OdometryCalibration {
   bool scale = false;     // lengths are true lengths times exp(x[kScale]) (monocular)
   bool yaw_bias = false;  // yaw rate is off by x[kThermalYawBias]
+  bool delay = false;     // stamps are late by x[kThermalDelay]
 };
 
 // (v, psi') [m/s, rad/s]: the linear pseudo-measurement of arXiv 2505.03565, y = [v, psi'], optionally with scale.

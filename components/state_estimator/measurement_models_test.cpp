@@ -13,7 +13,8 @@ namespace {
 FilterState somewhere() {
   FilterState s;
   s.stamp_ns = 100'000'000;
-  s.x << 4.0, 2.0, 7.0, 0.5, 3.0, -0.2, 0.1, 0.08, 0.004, 0.01, 0.05, 3.2, 1.4, -3.1, 1.0, 1.0, 0.3, 0.0, 0.0, 0.0;
+  s.x << 4.0, 2.0, 7.0, 0.5, 3.0, -0.2, 0.1, 0.08, 0.004, 0.06, 0.01, 0.05, 3.2, 1.4, -3.1, 1.0, 1.0, 0.3, 0.0, 0.0,
+      0.0;
   s.clone_stamp_ns = {0, 0, kNoStamp};
   return s;
 }
@@ -24,6 +25,9 @@ TEST(MeasurementModels, JacobiansEqualCentralDifferences) {
   models.push_back(std::make_unique<SpeedAndYawRate>(OdometryCalibration{.scale = true, .yaw_bias = true}));
   models.push_back(std::make_unique<PlanarRelativePose>(0));
   models.push_back(std::make_unique<PlanarRelativePose>(1, OdometryCalibration{.scale = true, .yaw_bias = true}));
+  const OdometryCalibration late{.scale = true, .yaw_bias = true, .delay = true};
+  models.push_back(std::make_unique<SpeedAndYawRate>(late));
+  models.push_back(std::make_unique<PlanarRelativePose>(0, late));
   models.push_back(std::make_unique<GyroYawRate>());
   models.push_back(std::make_unique<ImuYawRateAndAcceleration>(Eigen::Vector2d(0.4, -0.3)));
   models.push_back(std::make_unique<GnssPosition>(Eigen::Vector2d(0.4, -0.3)));
@@ -68,6 +72,17 @@ TEST(MeasurementModels, ScaledRelativePose) {
   m.value << 1.8, 0.0, 0.0004;
   const Linearization l = PlanarRelativePose(0, {.scale = true, .yaw_bias = true}).linearize(s, m);
   EXPECT_LT(l.innovation.norm(), 1e-12);
+}
+
+TEST(MeasurementModels, AnAccelerationThatMayBeNoiseSaysNothingOfTheDelay) {
+  FilterState s = somewhere();
+  Measurement m;
+  m.stamp_ns = 100'000'000;
+  m.anchor_ns = 0;
+  const PlanarRelativePose model(0, {.delay = true});
+  EXPECT_NEAR(model.linearize(s, m).jacobian.col(kThermalDelay).head<2>().norm(), 0.1 * 0.5, 1e-12);
+  s.p(kAccel, kAccel) = 25.0;
+  EXPECT_LT(model.linearize(s, m).jacobian.col(kThermalDelay).head<2>().norm(), 0.1 * 0.005);
 }
 
 }  // namespace

@@ -40,6 +40,7 @@ void step(FilterState& s, double dt, double decay_tau, const ProcessNoise& noise
   };
   walk(kScale, noise.scale);
   walk(kThermalYawBias, noise.thermal_yaw_bias);
+  walk(kThermalDelay, noise.thermal_delay);
   walk(kGyroBias, noise.gyro_bias);
   walk(kAccelBias, noise.accel_bias);
 }

@@ -20,6 +20,7 @@ struct ProcessNoise {
   double yaw = 0.0;                 // rad^2/s, on the heading
   double scale = 1e-8;              // 1/s, on ln(scale)
   double thermal_yaw_bias = 1e-10;  // rad^2/s^3
+  double thermal_delay = 1e-8;      // s
   double gyro_bias = 1e-10;         // rad^2/s^3
   double accel_bias = 1e-7;         // m^2/s^5
   // The paper's form: one fixed diagonal, scaled by the step only; no cross terms between s, v, a or psi, omega, alpha.

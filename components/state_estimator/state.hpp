@@ -24,6 +24,7 @@ enum Index : int {
   kYawAccel,        // rad/s^2
   kScale,           // ln of (thermal length / true length)
   kThermalYawBias,  // rad/s, thermal yaw rate minus true yaw rate
+  kThermalDelay,    // s, by which the thermal stamps are later than what they stamp
   kGyroBias,        // rad/s
   kAccelBias,       // m/s^2
   kFirstClone,

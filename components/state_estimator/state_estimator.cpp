@@ -371,6 +371,8 @@ Status StateEstimator::status(std::int64_t now_ns) const {
   status.conflict = head.conflict;
   status.thermal_scale = std::exp(head.x(kScale));
   status.thermal_scale_sigma = status.thermal_scale * std::sqrt(std::max(0.0, head.p(kScale, kScale)));
+  status.thermal_delay = head.x(kThermalDelay);
+  status.thermal_delay_sigma = std::sqrt(std::max(0.0, head.p(kThermalDelay, kThermalDelay)));
   status.clock_jumps = clock_jumps_;
   status.forgotten_motions = forgotten_motions_;
   status.replays = replays_;

@@ -91,6 +91,9 @@ class StateEstimatorComponent final : public Component {
                       "motion that is not along the heading, density [m^2/s]: a walking robot sways, 1e-3"};
   Param<double> thermal_scale_sigma_{*this, "thermal_scale_sigma", 0.1, Range{1e-4, 10.0},
                                      "of ln(scale) at the start: 0.02 with LiDAR depth"};
+  Param<double> thermal_delay_sigma_{
+      *this,        "thermal_delay_sigma", 0.03,
+      Unit::second, Range{0.0, 1.0},       "of the thermal stamps, one and the same for all; 0: they are right"};
   Param<double> lidar_anchor_period_{
       *this,        "lidar_anchor_period", 0.0,
       Unit::second, Range{0.0, 10.0},      "LiDAR poses are fused relative to one this old; 0: to the one before"};
@@ -202,9 +205,10 @@ Result<void> StateEstimatorComponent::configure() {
   config_.odometries[1].odometry.floor_yaw = thermal_yaw_floor_;
   if (thermal_calibration_ != Switch::preset) {
     const bool on = thermal_calibration_ == Switch::on;
-    config_.odometries[1].odometry.calibration = {.scale = on, .yaw_bias = on};
+    config_.odometries[1].odometry.calibration = {.scale = on, .yaw_bias = on, .delay = on};
   }
   config_.initial.sigma_scale = thermal_scale_sigma_;
+  config_.initial.sigma_thermal_delay = thermal_delay_sigma_;
   if (adaptive_noise_ != Switch::preset) config_.adaptation.enabled = adaptive_noise_ == Switch::on;
   if (jerk_ > 0.0) config_.process.noise.jerk = jerk_;
   if (yaw_jerk_ > 0.0) config_.process.noise.yaw_jerk = yaw_jerk_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "components/state_estimator/measurement_models.hpp"
 #include "components/state_estimator/mission.hpp"
@@ -96,6 +97,43 @@ TEST(StateEstimator, ThermalScaleAndBiasAreFoundAndCarriedThroughAnOutage) {
   drive(90 * kSecond, false);
   EXPECT_LT(run.error() - before, 0.6);  // 1 % of 60 m; without the scale state it would be 4.8 m
   EXPECT_EQ(e.status(run.now).mode, Mode::thermal);
+}
+
+// A camera whose driver stamps what arrived 80 ms ago, on a car that speeds up and slows down: the delay is found, with
+// a deviation that covers what is left of it, and the position is the LiDAR's. At a constant speed nothing tells it.
+TEST(StateEstimator, ThermalDelayIsFoundWhereTheSpeedChanges) {
+  constexpr std::int64_t late = 80 * kMillisecond;
+  for (const double swing : {0.0, 3.0}) {  // m/s, of a speed of 8 m/s with a period of 12 s
+    const auto truth = [&](std::int64_t t) {
+      const double s = seconds_between(0, t), w = 2.0 * M_PI / 12.0;
+      return planar(8.0 * s - swing / w * std::cos(w * s), 0.0, 0.0);
+    };
+    const std::unique_ptr<StateEstimator> e = make(Config::standard());
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> noise;
+    const auto measured = [&](std::int64_t t, double sigma) {
+      Pose pose = truth(t);
+      pose.translation().x() += sigma * noise(random);
+      return pose;
+    };
+    e->start(0);
+    std::int64_t now = 0;
+    while (now < 40 * kSecond) {
+      now += 50 * kMillisecond;
+      e->add_odometry(1, sample(now, measured(now - late, 0.005)), now);
+      if (now % (100 * kMillisecond) == 0) e->add_odometry(0, sample(now, measured(now, 0.005)), now);
+    }
+    const Status status = e->status(now);
+    if (swing == 0.0) {
+      EXPECT_NEAR(status.thermal_delay, 0.0, 0.03);
+      EXPECT_GT(status.thermal_delay_sigma, 0.02);
+      continue;
+    }
+    EXPECT_NEAR(status.thermal_delay, 0.08, 0.02);
+    EXPECT_LT(std::abs(status.thermal_delay - 0.08), 3.0 * status.thermal_delay_sigma);
+    const Pose travelled = truth(50 * kMillisecond).inverse() * truth(now);
+    EXPECT_NEAR(e->state().x(kX), travelled.translation().x(), 0.5);
+  }
 }
 
 TEST(StateEstimator, RelativePredictionHasTheCovarianceOfTheMotionAlone) {

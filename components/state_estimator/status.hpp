@@ -30,6 +30,7 @@ struct Status {
   Mode mode = Mode::initializing;
   bool conflict = false;
   double thermal_scale = 1.0, thermal_scale_sigma = 0.0;
+  double thermal_delay = 0.0, thermal_delay_sigma = 0.0;  // s
   std::uint64_t clock_jumps = 0, forgotten_motions = 0, replays = 0;
   std::uint64_t closures = 0, closures_rejected = 0;
   std::vector<SensorReport> sensors;
