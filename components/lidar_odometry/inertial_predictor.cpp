@@ -285,8 +285,6 @@ std::optional<Prior> InertialPredictor::predict(const SweepStamps& sweep) {
     state_ = at_rest(last_ns_);
     if (last_twist_) set_velocity(*state_, *last_twist_);
   }
-  // The first motion is the registration's to find: how fast it starts, the IMU cannot know.
-  if (!first && state_->covariance(velocity, velocity) > 0.5 * unknown_velocity * unknown_velocity) return std::nullopt;
   sample_sweep(sweep);
   predicted_ = *state_;
   advance(*predicted_, last_ns_, sweep.reference_ns, true);

@@ -59,7 +59,8 @@ class InertialPredictor {
   void clear();
 
   // The prior of a sweep, with the poses within it; nothing if the samples do not tell. Its span is valid until the
-  // next call. Nothing for the second sweep either: the registration finds the first velocity.
+  // next call. Of the first two sweeps the velocity is open: what turns and accelerates is known, and the second one's
+  // prior hardly holds its position.
   std::optional<Prior> predict(const SweepStamps& sweep);
   // What became of the sweep; without a prediction, too.
   void correct(const Estimate& estimate);

@@ -96,6 +96,11 @@ SweepTwist SurfelOdometry::twist_of(const SweepTask& task) const {
     twist.sampled = &task.sampled;
     twist.prediction = task.prediction;
     twist.translation_share = position_known(task) ? 0.0 : share;
+    if (redo_first_ && first_.sweep.sampled != nullptr && !position_known(task)) {
+      twist.last_middle = first_.sweep.middle(first_.pose, first_.sweep.predicted);
+      twist.expected_way =
+          twist.middle(task.prediction, twist.predicted).translation() - twist.last_middle.translation();
+    }
     return twist;
   }
   twist.translation_share = task.external ? 0.0 : share;
@@ -191,9 +196,15 @@ SurfelRegistrationResult SurfelOdometry::redo_start(SweepTwist twist, std::size_
     const Vector6d change = half * (result.twist - used);
     if (change.head<3>().norm() + mean_range * change.tail<3>().norm() < settled_way) break;
     used = result.twist;
+    Vector6d first_used = used;
+    if (twist.sampled != nullptr) {  // the velocity found, besides what was known of the motion
+      const Eigen::Vector3d velocity = result.pose.linear() * (used - twist.predicted).head<3>();
+      first_used = first_.sweep.predicted;
+      first_used.head<3>() += first_.pose.linear().transpose() * velocity;
+    }
     map_.clear();
-    map_.add(registration_.place(first_.surfels, first_.pose, first_.sweep, used), first_.pose.translation());
-    twist.last_middle = first_.sweep.middle(first_.pose, used);
+    map_.add(registration_.place(first_.surfels, first_.pose, first_.sweep, first_used), first_.pose.translation());
+    twist.last_middle = first_.sweep.middle(first_.pose, first_used);
     twist.rotation_from_middles = true;
     if (twist.sampled == nullptr) twist.predicted = used;
     prior.pose = result.pose;

@@ -27,12 +27,21 @@ SweepMotion SweepTwist::motion(const Vector6d& twist) const {
 
 Pose SweepTwist::middle(const Pose& pose, const Vector6d& twist) const {
   if (!times) return pose;
-  return pose * se3_exp((0.5 * (times->first + times->last) - reference_time) * twist);
+  const double time = 0.5 * (times->first + times->last);
+  if (sampled == nullptr) return pose * se3_exp((time - reference_time) * twist);
+  Pose within = Pose::Identity();
+  within.matrix().topRows<3>() = motion(twist).at(time);
+  return pose * within;
 }
 
 Vector6d SweepTwist::refined(const Pose& pose, const Vector6d& used) const {
   if (!(dt > 0.0)) return used;
   Vector6d twist = predicted;
+  if (sampled != nullptr && expected_way) {
+    const Eigen::Vector3d way = middle(pose, used).translation() - last_middle.translation();
+    twist.head<3>() += translation_share / dt * (pose.linear().transpose() * (way - *expected_way));
+    return twist;
+  }
   if (sampled != nullptr) {
     twist.head<3>() += translation_share / dt * (prediction.inverse() * pose).translation();
     return twist;

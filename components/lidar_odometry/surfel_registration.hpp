@@ -50,6 +50,9 @@ struct SweepTwist {
   // correct the translation: by how far the pose is from where that motion led.
   const SweepMotion* sampled = nullptr;
   Pose prediction = Pose::Identity();
+  // With it, of the first two sweeps: where that motion leads from middle to middle, in map axes [m]. Their common
+  // velocity is open, and poses at the ends would feed back.
+  std::optional<Eigen::Vector3d> expected_way;
 
   // The motion that compensates for a twist.
   SweepMotion motion(const Vector6d& twist) const;

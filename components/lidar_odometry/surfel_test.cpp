@@ -220,6 +220,36 @@ TEST(DirectionalInformation, AttenuatesTheHessianItIsGiven) {
   EXPECT_LT((gradient - Vector6d::Ones()).norm(), 1e-9);
 }
 
+// A sweep compensated with a wrong twist is displaced by what the lag says.
+TEST(SurfelRegistration, TellsWhatAWrongMotionWithinTheSweepDoes) {
+  const Config config;
+  const std::vector<Surfel> first = surfels_of(scan(hall(), {}, Pose::Identity(), Vector6d::Zero(), 0, 1));
+  const std::vector<Surfel> second = surfels_of(scan(hall(), {}, Pose::Identity(), Vector6d::Zero(), 0, 2));
+  SurfelMap map(config.surfel.cell_size, 80.0, 1 << 15);
+  SurfelRegistration registration(config.surfel);
+  WorkerPool pool(1);
+  map.add(registration.place(first, Pose::Identity(), {}, Vector6d::Zero()), Eigen::Vector3d::Zero());
+  SurfelPrior loose;
+  loose.information = 1e-3 * Matrix6d::Identity();
+  const auto aligned = [&](const Vector6d& twist) {
+    SweepTwist sweep;
+    sweep.times = TimeSpan{0.0, 0.1};
+    sweep.reference_time = 0.1;
+    sweep.predicted = twist;
+    return registration.align(second, map, Pose::Identity(), loose, sweep, 0.5, 30, pool);
+  };
+  const SurfelRegistrationResult still = aligned(Vector6d::Zero());
+  for (int axis = 0; axis < 6; ++axis) {
+    Vector6d wrong = Vector6d::Zero();
+    wrong[axis] = axis < 3 ? 0.3 : 0.05;
+    const Vector6d moved = se3_log(still.pose.inverse() * aligned(wrong).pose);
+    const Vector6d told = still.lag * wrong;
+    EXPECT_NEAR(still.lag(axis, axis), 0.05, 0.02) << axis;
+    EXPECT_LT((moved - told).head<3>().norm(), 0.2 * told.head<3>().norm() + 1e-3) << axis;
+    EXPECT_LT((moved - told).tail<3>().norm(), 0.2 * told.tail<3>().norm() + 1.5e-4) << axis;
+  }
+}
+
 // Whenever in the sweep the evidence of the position lies: an error of the twist decays. The pose at the end is off by
 // what the wrong twist makes of the time from the evidence to the end.
 TEST(SweepTwist, ErrorsDecayWhereverTheEvidenceLies) {
