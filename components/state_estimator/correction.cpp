@@ -11,32 +11,25 @@ namespace {
 
 template <int Rows>
 struct Terms {
-  Eigen::Matrix<double, Rows, kStates> h;
-  Eigen::Matrix<double, kStates, Rows> pht;
   Eigen::Matrix<double, Rows, 1> nu;
-  Eigen::Matrix<double, Rows, Rows> r, s;
-  Eigen::LLT<Eigen::Matrix<double, Rows, Rows>> cholesky;
+  Eigen::Matrix<double, Rows, Rows> r;
+  Eigen::LLT<Eigen::Matrix<double, Rows, Rows>> cholesky;  // of S
 
-  Terms(const FilterState& state, const Innovation& innovation)
-      : h(innovation.jacobian.topRows<Rows>()),
-        nu(innovation.value.head<Rows>()),
-        r(innovation.covariance.topLeftCorner<Rows, Rows>()) {
-    pht.noalias() = state.p * h.transpose();
-    s.noalias() = h * pht;
-    s += r;
-    cholesky.compute(s);
+  explicit Terms(const Innovation& innovation)
+      : nu(innovation.value.head<Rows>()), r(innovation.covariance.topLeftCorner<Rows, Rows>()) {
+    cholesky.compute(innovation.predicted.topLeftCorner<Rows, Rows>() + r);
   }
 };
 
 template <int Rows>
-double distance(const FilterState& state, const Innovation& innovation) {
-  const Terms<Rows> t(state, innovation);
+double distance(const Innovation& innovation) {
+  const Terms<Rows> t(innovation);
   return t.cholesky.info() == Eigen::Success ? t.nu.dot(t.cholesky.solve(t.nu)) : -1.0;
 }
 
 template <int Rows>
-double share(const FilterState& state, const Innovation& innovation) {
-  const Terms<Rows> t(state, innovation);
+double share(const Innovation& innovation) {
+  const Terms<Rows> t(innovation);
   return t.cholesky.info() == Eigen::Success ? t.cholesky.solve(t.r).trace() / Rows : 0.0;
 }
 
@@ -52,15 +45,17 @@ void move_errors(StateMatrix& p, int position, int heading, const Eigen::Vector2
 
 template <int Rows>
 bool correct_rows(FilterState& state, const Innovation& innovation) {
-  const Terms<Rows> t(state, innovation);
+  const Terms<Rows> t(innovation);
   if (t.cholesky.info() != Eigen::Success) return false;
-  const Eigen::Matrix<double, kStates, Rows> k = t.cholesky.solve(t.pht.transpose()).transpose();
+  const auto h = innovation.jacobian.topRows<Rows>();
+  const Eigen::Matrix<double, kStates, Rows> pht = innovation.cross.leftCols<Rows>();
+  const Eigen::Matrix<double, kStates, Rows> k = t.cholesky.solve(pht.transpose()).transpose();
   const StateVector x = state.x + k * t.nu;
   // (I - K H) P, then times (I - K H)' plus K R K', each as a low-rank change.
   StateMatrix p = state.p;
-  p.noalias() -= k * t.pht.transpose();
-  const Eigen::Matrix<double, kStates, Rows> rest = k * t.r - p * t.h.transpose();
-  p.noalias() += rest * k.transpose();
+  p.noalias() -= k.lazyProduct(pht.transpose());
+  const Eigen::Matrix<double, kStates, Rows> rest = k * t.r - p.lazyProduct(h.transpose());
+  p.noalias() += rest.lazyProduct(k.transpose());
   move_errors(p, kX, kYaw, x.segment<2>(kX) - state.x.segment<2>(kX));
   for (int slot = 0; slot < kCloneSlots; ++slot) {
     const int pose = clone_index(slot);
@@ -100,21 +95,27 @@ double chi_square(int dof, Quantile quantile) {
   return table[dof < 1 ? 0 : dof > 3 ? 2 : dof - 1][static_cast<int>(quantile)];
 }
 
-Innovation project(const Linearization& linearization, const Measurement& measurement) {
+Innovation project(const FilterState& state, const Linearization& linearization, const Measurement& measurement) {
   Innovation innovation;
   innovation.rows = measurement.rows;
   innovation.value = measurement.projection * linearization.innovation;
   innovation.jacobian = measurement.projection * linearization.jacobian;
   innovation.covariance = measurement.covariance;
+  see_from(state, innovation);
   return innovation;
 }
 
-double squared_distance(const FilterState& state, const Innovation& innovation) {
-  return with_rows(innovation, -1.0, [&](auto rows) { return distance<rows>(state, innovation); });
+void see_from(const FilterState& state, Innovation& innovation) {
+  innovation.cross.noalias() = state.p.lazyProduct(innovation.jacobian.transpose());
+  innovation.predicted.noalias() = innovation.jacobian.lazyProduct(innovation.cross);
 }
 
-double noise_share(const FilterState& state, const Innovation& innovation) {
-  return with_rows(innovation, 0.0, [&](auto rows) { return share<rows>(state, innovation); });
+double squared_distance(const Innovation& innovation) {
+  return with_rows(innovation, -1.0, [&](auto rows) { return distance<rows>(innovation); });
+}
+
+double noise_share(const Innovation& innovation) {
+  return with_rows(innovation, 0.0, [&](auto rows) { return share<rows>(innovation); });
 }
 
 bool correct(FilterState& state, const Innovation& innovation) {

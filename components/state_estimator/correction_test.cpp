@@ -47,7 +47,7 @@ TEST(Correction, EqualsTheInformationForm) {
     s.p += 0.1 * StateMatrix::Identity();
     s.x(kYaw) = 0.1;
     const Measurement m = test::rates(0, 0, 1.0, 0.2, 0.3, 0.05);
-    const Innovation innovation = project(SpeedAndYawRate().linearize(s, m), m);
+    const Innovation innovation = project(s, SpeedAndYawRate().linearize(s, m), m);
     const auto h = innovation.jacobian.topRows<2>();
     const Eigen::Matrix2d r = innovation.covariance.topLeftCorner<2, 2>();
     const StateMatrix information = s.p.inverse() + h.transpose() * r.inverse() * h;
@@ -75,8 +75,8 @@ TEST(Correction, DistanceByHand) {
   s.p(kSpeed, kSpeed) = 3.0;
   s.p(kYawRate, kYawRate) = 0.01;
   const Measurement m = test::rates(0, 0, 4.0, 0.0, 1.0, 0.1);
-  const Innovation i = project(SpeedAndYawRate().linearize(s, m), m);
-  EXPECT_NEAR(squared_distance(s, i), 4.0, 1e-12);  // 4^2 / (3 + 1)
+  const Innovation i = project(s, SpeedAndYawRate().linearize(s, m), m);
+  EXPECT_NEAR(squared_distance(i), 4.0, 1e-12);  // 4^2 / (3 + 1)
 }
 
 TEST(Correction, RefusesWhatIsNotANumberAndChangesNothing) {
@@ -84,14 +84,14 @@ TEST(Correction, RefusesWhatIsNotANumberAndChangesNothing) {
   FilterState s = random_state(random);
   const FilterState before = s;
   Measurement m = test::rates(0, 0, std::nan(""), 0.2, 0.3, 0.05);
-  EXPECT_FALSE(correct(s, project(SpeedAndYawRate().linearize(s, m), m)));
+  EXPECT_FALSE(correct(s, project(s, SpeedAndYawRate().linearize(s, m), m)));
   m = test::rates(0, 0, 1.0, 0.2, 0.3, 0.05);
   m.covariance *= -1e6;
-  EXPECT_FALSE(correct(s, project(SpeedAndYawRate().linearize(s, m), m)));
+  EXPECT_FALSE(correct(s, project(s, SpeedAndYawRate().linearize(s, m), m)));
   m.covariance.setConstant(std::numeric_limits<double>::infinity());
-  EXPECT_FALSE(correct(s, project(SpeedAndYawRate().linearize(s, m), m)));
+  EXPECT_FALSE(correct(s, project(s, SpeedAndYawRate().linearize(s, m), m)));
   m.rows = 0;
-  EXPECT_FALSE(correct(s, project(SpeedAndYawRate().linearize(s, m), m)));
+  EXPECT_FALSE(correct(s, project(s, SpeedAndYawRate().linearize(s, m), m)));
   EXPECT_EQ((s.x - before.x).norm(), 0.0);
   EXPECT_EQ((s.p - before.p).norm(), 0.0);
 }
@@ -102,7 +102,7 @@ TEST(Correction, AnglesStayWrapped) {
   s.p(kYaw, kYaw) = s.p(kYawRate, kYawRate) = 1.0;
   s.p(kYaw, kYawRate) = s.p(kYawRate, kYaw) = 0.99;
   const Measurement m = test::rates(0, 0, 0.0, 0.3, 1.0, 0.01);
-  ASSERT_TRUE(correct(s, project(SpeedAndYawRate().linearize(s, m), m)));
+  ASSERT_TRUE(correct(s, project(s, SpeedAndYawRate().linearize(s, m), m)));
   EXPECT_LT(s.x(kYaw), 0.0);
   EXPECT_GT(s.x(kYaw), -M_PI);
 }

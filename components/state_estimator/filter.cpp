@@ -74,16 +74,16 @@ void Filter::apply(FilterState& state, const Measurement& m) const {
 bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel& sensor,
                      Innovation& innovation) const {
   SensorState& statistics = state.sensors[m.sensor];
-  innovation = project(sensor.model->linearize(state, m), m);
+  innovation = project(state, sensor.model->linearize(state, m), m);
   if (sensor.moves && m.rows > 0) {
-    observe_surprise(statistics.window, std::max(0.0, squared_distance(state, innovation)) / m.rows);
+    observe_surprise(statistics.window, std::max(0.0, squared_distance(innovation)) / m.rows);
   }
   if (sensor.moves) innovation.covariance *= conflict_inflation(state, m.sensor, disagreement);
   const bool disbelieved = m.motion.suspicion >= 1.0;  // by its own front end
   if (disagreement.enabled && !disbelieved) innovation.covariance /= square(1.0 - m.motion.suspicion);
   const bool adapts = adaptation.enabled && sensor.adapts;
   if (adapts) innovation.covariance *= statistics.noise.factor;
-  const double nis = squared_distance(state, innovation);
+  const double nis = squared_distance(innovation);
   statistics.nis = nis;
   statistics.nis_dof = m.rows;
   if (!(nis >= 0.0)) {
@@ -98,7 +98,7 @@ bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel
     return false;
   }
   if (adapts && !state.conflict) {
-    statistics.noise.add(nis, m.rows, noise_share(state, innovation), adaptation);
+    statistics.noise.add(nis, m.rows, noise_share(innovation), adaptation);
   }
   if (!gate.enabled || !sensor.gated) return true;
   const double certain = chi_square(m.rows, Quantile::p95);
@@ -109,6 +109,7 @@ bool Filter::examine(FilterState& state, const Measurement& m, const SensorModel
       return false;
     }
     ++statistics.forced;
+    see_from(state, innovation);
   } else if (gate.robust && nis > certain) {
     innovation.covariance *= std::sqrt(nis / certain);  // Huber: weight sqrt(c / nis)
   }

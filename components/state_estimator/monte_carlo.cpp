@@ -86,10 +86,8 @@ MonteCarloResult monte_carlo(const MonteCarloConfig& mc) {
         Measurement lidar = rates(0, t, x(kSpeed) + mc.lidar_sigma_v * drive.noise(),
                                   x(kYawRate) + mc.lidar_sigma_w * drive.noise(), mc.lidar_sigma_v, mc.lidar_sigma_w);
         const FilterState before = *buffer.state_at(t);
-        const Innovation innovation = project(SpeedAndYawRate().linearize(before, lidar), lidar);
-        const Eigen::Matrix2d s =
-            (innovation.jacobian * before.p * innovation.jacobian.transpose()).topLeftCorner<2, 2>() +
-            innovation.covariance.topLeftCorner<2, 2>();
+        const Innovation innovation = project(before, SpeedAndYawRate().linearize(before, lidar), lidar);
+        const Eigen::Matrix2d s = (innovation.predicted + innovation.covariance).topLeftCorner<2, 2>();
         innovations.push_back(s.llt().matrixL().solve(innovation.value.head<2>()));
         buffer.insert(lidar);
         ++result.updates;

@@ -27,11 +27,11 @@ void step(FilterState& s, double dt, double decay_tau, const ProcessNoise& noise
   const CoreMatrix q = process_noise(x, dt, noise);
   s.x.head<kCoreStates>() = transition(x, dt, decay_tau);
   constexpr int rest = kStates - kCoreStates;
-  const CoreMatrix gp = g * s.p.topLeftCorner<kCoreStates, kCoreStates>();
-  CoreMatrix core = gp * g.transpose() + q;
+  const CoreMatrix gp = g.lazyProduct(s.p.topLeftCorner<kCoreStates, kCoreStates>());
+  CoreMatrix core = gp.lazyProduct(g.transpose()) + q;
   core = 0.5 * (core + core.transpose()).eval();
   s.p.topLeftCorner<kCoreStates, kCoreStates>() = core;
-  const Eigen::Matrix<double, kCoreStates, rest> cross = g * s.p.topRightCorner<kCoreStates, rest>();
+  const Eigen::Matrix<double, kCoreStates, rest> cross = g.lazyProduct(s.p.topRightCorner<kCoreStates, rest>());
   s.p.topRightCorner<kCoreStates, rest>() = cross;
   s.p.bottomLeftCorner<rest, kCoreStates>() = cross.transpose();
   // A calibration state without variance is switched off and stays so.

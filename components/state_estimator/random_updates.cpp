@@ -68,7 +68,7 @@ void stays_positive(int updates) {
     const double a = std::pow(10.0, exponent(random)), b = std::pow(10.0, exponent(random));
     m.covariance = Eigen::Vector3d(a, b, std::pow(10.0, exponent(random))).asDiagonal();
     const Linearization l = model->linearize(s, m);
-    Innovation innovation = project(l, m);
+    Innovation innovation = project(s, l, m);
     innovation.value = 0.3 * Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
     used += correct(s, innovation) ? 1 : 0;
     // The random innovations carry the state off: bring it back, the covariance is what is under test.
