@@ -16,6 +16,7 @@ FilterState somewhere() {
   s.x << 4.0, 2.0, 7.0, 0.5, 3.0, -0.2, 0.1, 0.08, 0.004, 0.06, 0.01, 0.05, 3.2, 1.4, -3.1, 1.0, 1.0, 0.3, 0.0, 0.0,
       0.0;
   s.clone_stamp_ns = {0, 0, kNoStamp};
+  s.sensors[1].window.stamp_ns = s.sensors[1].last_accepted_ns = 50'000'000;
   return s;
 }
 
