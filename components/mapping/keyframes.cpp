@@ -2,8 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace adit::mapping {
+
+Pose along_the_way(const Keyframe& keyframe) {
+  const double turn = keyframe.backwards ? std::numbers::pi : 0.0;
+  return Pose(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
+}
 
 KeyframeBuilder::Outcome KeyframeBuilder::add(const Sweep& sweep, const Trajectory& odometry,
                                               const Eigen::Vector3d& unobserved) {
@@ -46,10 +52,13 @@ void KeyframeBuilder::make_keyframe(const StampedPose& now) {
   next.way = keyframe_.way;
   sections_.clear();
   if (any_keyframe_ && !jumped_) {
-    const double step = (now.pose.translation() - keyframe_.odom.translation()).norm();
+    const Eigen::Vector3d moved = now.pose.translation() - keyframe_.odom.translation();
+    const double step = moved.norm();
     next.way += step;
+    next.backwards = moved.dot(now.pose.linear().col(0)) < 0.0;
     const auto count = static_cast<std::size_t>(std::lround(step / section_spacing));
-    sections_ = cut_sections(around, keyframe_.odom, now.pose, count, config_.section_reach);
+    const Pose along = along_the_way(next);
+    sections_ = cut_sections(around, keyframe_.odom * along, now.pose * along, count, config_.section_reach);
     next.sections_end += sections_.size();
   }
   VoxelGrid grid(config_.voxel);

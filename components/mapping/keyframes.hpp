@@ -16,12 +16,16 @@ struct Keyframe {
   Pose odom = Pose::Identity();  // T_odom_sensor
   double way = 0.0;              // m driven since the first one
   std::size_t sections_end = 0;  // sections of the history up to here
+  bool backwards = false;        // the sensor looked back on the way to here: its sections look the other way
   // Around it, in its frame, one a voxel: of all sweeps since they came near. Empty: another keyframe's serve.
   Points points;
   // Axis [sensor frame] along which the odometry saw nothing on the way here; zero: none.
   Eigen::Vector3d unobserved = Eigen::Vector3d::Zero();
   bool after_jump = false;  // the odometry did not get here as a body moves: restarted
 };
+
+// T_keyframe_section's turn: axes that look along the way it was driven, in those of the keyframe.
+Pose along_the_way(const Keyframe& keyframe);
 
 class KeyframeBuilder {
  public:

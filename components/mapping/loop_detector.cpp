@@ -59,7 +59,7 @@ std::pair<NodeId, Pose> LoopDetector::place_of(std::size_t section) const {
   const Keyframe& to = drive_.keyframes[id];
   const auto count = static_cast<double>(to.sections_end - from.sections_end);
   const double fraction = (static_cast<double>(section - from.sections_end) + 0.5) / std::max(1.0, count);
-  return {id, to.odom.inverse() * se3_interpolate(from.odom, to.odom, fraction)};
+  return {id, to.odom.inverse() * se3_interpolate(from.odom, to.odom, fraction) * along_the_way(to)};
 }
 
 LoopDetector::Candidate LoopDetector::candidate_of(const SectionMatch& match, NodeId i) const {
@@ -135,24 +135,25 @@ std::optional<double> LoopDetector::agreement(NodeId from, NodeId i, const Pose&
   const Keyframe& here = drive_.keyframes[i];
   if (here.sections_end == 0) return std::nullopt;
   const std::size_t end = here.sections_end - 1;
-  const Eigen::Vector3d place = (T_from_i * place_of(end).second).translation();
+  const Pose place = T_from_i * place_of(end).second;
   // The section beside it on the old way.
   const NodeId first = from > neighbours ? from - neighbours : 0;
   const NodeId last = std::min<NodeId>(from + neighbours, i - 1);
   const Pose back = drive_.graph.pose(from).inverse();
   std::optional<std::size_t> beside;
   double least = std::numeric_limits<double>::infinity();
+  bool reversed = false;
   for (std::size_t s = drive_.keyframes[first].sections_end; s < drive_.keyframes[last].sections_end; ++s) {
     const auto [keyframe, T_keyframe_section] = place_of(s);
     const Pose at = back * drive_.graph.pose(keyframe) * T_keyframe_section;
-    const double distance = (at.translation() - place).norm();
+    const double distance = (at.translation() - place.translation()).norm();
     if (distance < least) {
       least = distance;
       beside = s;
+      reversed = at.linear().col(0).dot(place.linear().col(0)) < 0.0;
     }
   }
   if (!beside) return std::nullopt;
-  const bool reversed = T_from_i.linear()(0, 0) < 0.0;
   std::optional<double> best;
   for (std::size_t s = *beside > 0 ? *beside - 1 : 0; s <= *beside + 1; ++s) {
     const std::optional<double> score = drive_.sections.correlate(end, s, reversed);

@@ -78,7 +78,8 @@ void Mapper::Impl::add_keyframe() {
     return;
   }
   if (*id > 0) (void)drive.graph.add_edge(odometry_edge(drive.keyframes.back(), next));
-  if (next.after_jump) drive.sections.begin_run();
+  const bool turned = !drive.keyframes.empty() && next.backwards != drive.keyframes.back().backwards;
+  if (next.after_jump || turned) drive.sections.begin_run();
   for (const Section& section : builder.sections()) drive.sections.add(section);
   queue.push_back(*id);
   // The builder needs pose and counts of its last keyframe, not its points.

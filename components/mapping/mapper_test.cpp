@@ -85,6 +85,16 @@ TEST(Mapper, TwoLapsAreClosedAndTheMapIsStraightened) {
   EXPECT_LT(drive.mapper.global_map(0.3).size(), 240.0 * 25.0 / 0.09 * 2.0);
 }
 
+TEST(Mapper, AWayDrivenBackInReverseIsClosed) {
+  const TestTunnel tunnel;
+  Drive drive;
+  for (double s = 0.0; s <= 160.0; s += step) drive.add(tunnel, s);
+  for (double s = 160.0 - step; s >= 0.0; s -= step) drive.add(tunnel, s);
+  drive.mapper.finish();
+  EXPECT_GE(drive.mapper.counters().closures, 10u);
+  EXPECT_LT(drive.worst_closure(), 0.2);
+}
+
 TEST(Mapper, ATubeThatLooksLikeAnotherIsNotTakenForIt) {
   // The second lap is through another tube of the same shape, 25 m away; the drift's model makes the first one
   // possible. Two pairs of tubes.
