@@ -137,11 +137,11 @@ lidar_odometry:
                                      folder.file("folder/imu.csv"), "--out", folder.file("folder.tum")});
   ASSERT_EQ(of_folder.exit_code, 0) << of_folder.text;
   EXPECT_THAT(of_folder.text, HasSubstr("40 of 40 clouds have a pose"));
-  EXPECT_THAT(of_folder.text, HasSubstr(", 1 without IMU"));  // the first motion
+  EXPECT_EQ(of_folder.text.find("without IMU"), std::string::npos) << of_folder.text;
   const Output of_bag = run_adit(
       {"odometry", "lidar", "--input", folder.file("bag"), "--config", parameters, "--out", folder.file("bag.tum")});
   ASSERT_EQ(of_bag.exit_code, 0) << of_bag.text;
-  EXPECT_THAT(of_bag.text, HasSubstr(", 1 without IMU"));
+  EXPECT_EQ(of_bag.text.find("without IMU"), std::string::npos) << of_bag.text;
 
   const Result<Trajectory> truth = read_tum(folder.file("folder/gt_end.tum"));
   const Result<Trajectory> files = read_tum(folder.file("folder.tum")), bag = read_tum(folder.file("bag.tum"));
