@@ -31,11 +31,13 @@ void Window::clear() {
   sigma_ = 1.5F;
 }
 
-// Nothing is known but the boresight.
+// Nothing is known but the boresight; as the covariance is said of it, its information counts as often as that of
+// pixels.
 void Window::begin_prior() {
   prior_H_.setZero();
   prior_g_.setZero();
-  const Eigen::Matrix3d information = (boresight_covariance_ + 1e-14 * Eigen::Matrix3d::Identity()).inverse();
+  const Eigen::Matrix3d information =
+      config_.correlation * (boresight_covariance_ + 1e-14 * Eigen::Matrix3d::Identity()).inverse();
   prior_H_.bottomRightCorner<boresight_size, boresight_size>() = information;
   prior_g_.tail<boresight_size>() = -information * boresight_;
 }
@@ -179,14 +181,15 @@ Window::Stats Window::optimise(int iterations) {
       patch.slope_v *= patch.inverse_depth / old;
     }
     apply(step);
+    double moved = 0.0;
+    for (int s = 0; s < max_keyframes; ++s) moved = std::max(moved, step.segment<6>(s * state_size).norm());
+    if (moved >= 1e-5 && iteration + 1 < iterations) continue;
     Eigen::Matrix<double, Eigen::Dynamic, boresight_size, 0, dimension, boresight_size> unit(active, boresight_size);
     unit.setZero();
     unit.bottomRows<boresight_size>() = scale.tail<boresight_size>().asDiagonal();
     boresight_covariance_ =
         config_.correlation * (scale.asDiagonal() * factors.solve(unit)).bottomRows<boresight_size>();
-    double moved = 0.0;
-    for (int s = 0; s < max_keyframes; ++s) moved = std::max(moved, step.segment<6>(s * state_size).norm());
-    if (moved < 1e-5) break;
+    break;
   }
   linearise(false, 1e-4);
   stats.sigma = sigma_;

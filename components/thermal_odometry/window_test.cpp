@@ -244,6 +244,16 @@ TEST(Window, RefinesPosesAndDepths) {
   EXPECT_LT(toy.error(3), before);
 }
 
+// As given and as said, however often pixels are counted: nothing here tells of the boresight.
+TEST(Window, AnUntoldBoresightKeepsItsCovariance) {
+  Toy toy;
+  for (int i = 0; i < 3; ++i) toy.add(0.15 * i, 0, 0, 1, 0.3);
+  toy.window.optimise(4);
+  const double given = Window::Config().boresight_sigma;
+  for (double variance : toy.window.boresight_covariance().diagonal())
+    EXPECT_NEAR(std::sqrt(variance), given, 1e-3 * given);
+}
+
 TEST(Window, AFewAnchorsRecoverTheScale) {
   Toy toy;
   for (int i = 0; i < 4; ++i) toy.add(0.15 * i, 0, 0, 0.9, 0.05);
