@@ -1,5 +1,6 @@
 #include "bringup/commands/rig_file.hpp"
 
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
