@@ -146,8 +146,17 @@ Result<bool> Recorder::drain(Subscription& s) {
     if (Result<void> written = writer_->write({s.index, stamp, sample.bytes()}); !written) return written.error();
     ++s.state.samples;
     s.state.bytes += sample.bytes().size();
+    // Here too: on a slow disk a round of large samples takes longer than what may be lost.
+    if (Result<void> committed = commit_when_due(); !committed) return committed.error();
   }
   return true;
+}
+
+Result<void> Recorder::commit_when_due() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_commit_) return {};
+  next_commit_ = now + kCommitEvery;
+  return writer_->commit();
 }
 
 Result<bool> Recorder::drain_all() {
@@ -178,9 +187,7 @@ Result<void> Recorder::step(Duration limit) {
     const std::lock_guard lock(mutex_);
     ready_ = true;
   }
-  if (Steady::now() < next_commit_) return {};
-  next_commit_ = Steady::now() + kCommitEvery;
-  return writer_->commit();
+  return commit_when_due();
 }
 
 Result<void> Recorder::close() {

@@ -51,6 +51,7 @@ class Recorder {
   // there may be more.
   Result<bool> drain(Subscription& subscription);
   Result<bool> drain_all();
+  Result<void> commit_when_due();
 
   RecorderConfig config_;
   std::unique_ptr<Participant> participant_;
