@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "components/geometry/rigid.hpp"
+#include "components/geometry/stamp_order.hpp"
 #include "components/lidar_odometry/localizability.hpp"
 #include "components/lidar_odometry/point_odometry.hpp"
 #include "components/lidar_odometry/surfel_odometry.hpp"
@@ -27,7 +28,8 @@ std::unique_ptr<Pipeline> make_pipeline(const Config& config, WorkerPool& pool) 
 }  // namespace
 
 struct LidarOdometry::Impl {
-  explicit Impl(const Config& c) : config(c), pool(c.threads), pipeline(make_pipeline(c, pool)) {}
+  explicit Impl(const Config& c)
+      : config(c), pool(c.threads), pipeline(make_pipeline(c, pool)), order(stamps_to_believe, c.max_gap_s) {}
 
   // The local map's frame starts at the first pose; the odometry frame is where an absolute prior puts it.
   Config config;
@@ -40,11 +42,9 @@ struct LidarOdometry::Impl {
   Vector6d twist = Vector6d::Zero();
   bool twist_known = false;  // from two registered sweeps
   int lost_in_a_row = 0;
-  std::int64_t refused_stamp = 0;  // of the last cloud refused for its stamp
-  int refused_in_a_row = 0;
+  StampOrder order;  // set back by less than a pause that keeps the map: clouds that overtook each other
 
   double reference_time(const std::optional<TimeSpan>& times) const;
-  bool accept_stamp(std::int64_t stamp_ns);
   void finish();
   void process(const Cloud& cloud, const Prior* prior);
 };
@@ -53,21 +53,6 @@ double LidarOdometry::Impl::reference_time(const std::optional<TimeSpan>& times)
   if (!times) return 0.0;
   const bool end = config.deskew && config.mode != Mode::genz;
   return end ? times->last : 0.5 * (times->first + times->last);
-}
-
-// A stamp must be later than the last one. One that is not is refused, until a few in a row show a new time base: one
-// that is set back by more than a pause in the old one may last. Less is what clouds that overtake each other look like.
-bool LidarOdometry::Impl::accept_stamp(std::int64_t stamp_ns) {
-  if (!started || stamp_ns > estimate.stamp_ns) {
-    refused_in_a_row = 0;
-    return true;
-  }
-  if (ns * static_cast<double>(estimate.stamp_ns - stamp_ns) <= config.max_gap_s) return false;
-  refused_in_a_row = refused_in_a_row > 0 && stamp_ns > refused_stamp ? refused_in_a_row + 1 : 1;
-  refused_stamp = stamp_ns;
-  if (refused_in_a_row < stamps_to_believe) return false;
-  refused_in_a_row = 0;
-  return true;
 }
 
 void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
@@ -86,7 +71,7 @@ void LidarOdometry::Impl::process(const Cloud& cloud, const Prior* prior) {
   task.times = time_span(cloud);
   task.reference_time = reference_time(task.times);
   const std::int64_t stamp_ns = cloud.stamp_ns + std::llround(task.reference_time / ns);
-  if (!accept_stamp(stamp_ns)) {
+  if (!order.accepts(stamp_ns, started ? std::optional(estimate.stamp_ns) : std::nullopt)) {
     estimate.status = Status::bad_stamp;
     ++estimate.total.refused;
     return finish();
@@ -201,7 +186,8 @@ void LidarOdometry::reset() {
   impl_->odom_map = impl_->map_sensor = Pose::Identity();
   impl_->twist.setZero();
   impl_->twist_known = false;
-  impl_->lost_in_a_row = impl_->refused_in_a_row = 0;
+  impl_->lost_in_a_row = 0;
+  impl_->order.clear();
 }
 
 }  // namespace adit::lidar_odometry

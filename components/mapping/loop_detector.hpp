@@ -33,7 +33,8 @@ class LoopDetector {
   };
   std::optional<pose_graph::NodeId> nearest_old(pose_graph::NodeId i) const;
   std::optional<Candidate> recognize(pose_graph::NodeId i) const;
-  std::pair<pose_graph::NodeId, Pose> place_of(std::size_t section) const;  // keyframe, T_keyframe_section looking along the way
+  // Keyframe and T_keyframe_section, which looks along the way.
+  std::pair<pose_graph::NodeId, Pose> place_of(std::size_t section) const;
   Candidate candidate_of(const SectionMatch& match, pose_graph::NodeId i) const;
   bool possible(const Candidate& candidate, pose_graph::NodeId i) const;
   Registration registered(const Candidate& candidate, pose_graph::NodeId i) const;

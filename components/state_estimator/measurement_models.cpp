@@ -19,15 +19,16 @@ bool others_see_motion(const FilterState& state, const Measurement& m) {
   return false;
 }
 
-// How fast speed or yaw rate change, as far as that is beyond doubt, and d(that) / d(acceleration state). An odometry's
+// How fast speed or yaw rate change, if that is beyond doubt, and d(that) / d(acceleration state). An odometry's
 // noise changes its sign from step to step, and an acceleration estimated from one step is of the other sign than the
 // next step's noise: taken for knowledge, the two look like a delay of 0.05 to 0.1 s where there is none.
 struct Change {
-  double rate, share;
+  double rate = 0.0, slope = 0.0;
   Change(const FilterState& state, int acceleration) {
     const double sigma = std::sqrt(std::max(0.0, state.p(acceleration, acceleration)));
-    share = std::abs(state.x(acceleration)) > 4.0 * sigma ? 1.0 : 0.0;
-    rate = share * state.x(acceleration);
+    if (std::abs(state.x(acceleration)) <= 4.0 * sigma) return;
+    rate = state.x(acceleration);
+    slope = 1.0;
   }
 };
 
@@ -43,8 +44,8 @@ Linearization SpeedAndYawRate::linearize(const FilterState& state, const Measure
     const Change along(state, kAccel), turn(state, kYawAccel);
     speed -= delay * along.rate;
     yaw_rate -= delay * turn.rate;
-    l.jacobian(0, kAccel) = -scale * delay * along.share;
-    l.jacobian(1, kYawAccel) = -delay * turn.share;
+    l.jacobian(0, kAccel) = -scale * delay * along.slope;
+    l.jacobian(1, kYawAccel) = -delay * turn.slope;
     if (others_see_motion(state, m)) {
       l.jacobian(0, kThermalDelay) = -scale * along.rate;
       l.jacobian(1, kThermalDelay) = -turn.rate;
@@ -78,8 +79,8 @@ Linearization PlanarRelativePose::linearize(const FilterState& state, const Meas
     moved -= earlier * ahead;
     turned -= delay * span * turn.rate;
     l.jacobian.block<2, 1>(0, kYaw) = scale * earlier * Eigen::Vector2d(ahead.y(), -ahead.x());
-    l.jacobian.block<2, 1>(0, kAccel) = -scale * delay * span * along.share * ahead;
-    l.jacobian(2, kYawAccel) = -delay * span * turn.share;
+    l.jacobian.block<2, 1>(0, kAccel) = -scale * delay * span * along.slope * ahead;
+    l.jacobian(2, kYawAccel) = -delay * span * turn.slope;
     if (others_see_motion(state, m)) {
       l.jacobian.block<2, 1>(0, kThermalDelay) = -scale * span * along.rate * ahead;
       l.jacobian(2, kThermalDelay) = -span * turn.rate;

@@ -28,7 +28,7 @@ T median(std::vector<T>& values) {
 }  // namespace
 
 FrameGate::FrameGate(const CameraModel& model, const Config& config)
-    : width_(model.width), height_(model.height), config_(config) {
+    : width_(model.width), height_(model.height), config_(config), order_(config.clock_run, config.clock_step_s) {
   const auto samples = static_cast<std::size_t>((width_ / gate_step + 1) * (height_ / gate_step + 1));
   last_.reserve(samples);
   current_.reserve(samples);
@@ -38,7 +38,10 @@ Verdict FrameGate::check(const Frame& frame, float noise) {
   const bool shape_ok = frame.data != nullptr && frame.width == width_ && frame.height == height_ &&
                         (frame.stride == 0 || frame.stride >= frame.width);
   if (!shape_ok) return Verdict::wrong_size;
-  if (!newer(frame.stamp_ns)) return Verdict::bad_stamp;
+  clock_set_back_ = false;
+  if (!order_.accepts(frame.stamp_ns, last_stamp_ns_)) return Verdict::bad_stamp;
+  clock_set_back_ = last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_;
+  last_stamp_ns_ = frame.stamp_ns;
 
   current_.clear();
   std::uint32_t low = 65535;
@@ -72,21 +75,6 @@ Verdict FrameGate::check(const Frame& frame, float noise) {
   if (high <= 255 || (low_bits == 0 && high > 255)) return Verdict::eight_bit;
   if (comparable && difference < config_.frozen_fraction * noise) return Verdict::frozen;
   return Verdict::good;
-}
-
-bool FrameGate::newer(std::int64_t stamp_ns) {
-  clock_set_back_ = false;
-  if (has_stamp_ && stamp_ns <= last_stamp_ns_) {
-    if (1e-9 * static_cast<double>(last_stamp_ns_ - stamp_ns) <= config_.clock_step_s) return false;
-    refused_run_ = refused_run_ > 0 && stamp_ns > refused_stamp_ns_ ? refused_run_ + 1 : 1;
-    refused_stamp_ns_ = stamp_ns;
-    if (refused_run_ < config_.clock_run) return false;
-    clock_set_back_ = true;
-  }
-  refused_run_ = 0;
-  has_stamp_ = true;
-  last_stamp_ns_ = stamp_ns;
-  return true;
 }
 
 float estimate_noise(const Frame& frame, std::vector<float>& differences) {

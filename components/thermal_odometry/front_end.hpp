@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "components/geometry/stamp_order.hpp"
 #include "components/thermal_odometry/camera.hpp"
 #include "components/thermal_odometry/frame.hpp"
 #include "components/thermal_odometry/pyramid.hpp"
@@ -40,15 +42,11 @@ class FrameGate {
   bool clock_set_back() const { return clock_set_back_; }
 
  private:
-  bool newer(std::int64_t stamp_ns);
-
   int width_;
   int height_;
   Config config_;
-  bool has_stamp_ = false;
-  std::int64_t last_stamp_ns_ = 0;
-  std::int64_t refused_stamp_ns_ = 0;
-  int refused_run_ = 0;
+  StampOrder order_;
+  std::optional<std::int64_t> last_stamp_ns_;
   bool clock_set_back_ = false;
   std::vector<std::uint16_t> last_;
   std::vector<std::uint16_t> current_;
