@@ -16,20 +16,6 @@ namespace {
 constexpr int kTile = 4;
 constexpr double kKnot = 2e-3;  // of the pose's interpolation [s]
 
-// Ages of the samples of an exponential trail [time constants]: the medians of `taps` equally likely parts.
-constexpr int kMostTaps = 10;
-struct TrailAges {
-  std::array<std::array<float, kMostTaps>, kMostTaps + 1> of{};
-  TrailAges() {
-    for (std::size_t taps = 1; taps <= kMostTaps; ++taps) {
-      for (std::size_t k = 0; k < taps; ++k) {
-        of[taps][k] = -std::log1p(-(static_cast<float>(k) + 0.5F) / static_cast<float>(taps));
-      }
-    }
-  }
-};
-const TrailAges kAges;
-
 // Midpoint rule over the band; Planck's law with h, c, k of the 2019 SI.
 double band_radiance(double kelvin) {
   constexpr double h = 6.62607015e-34, c = 2.99792458e8, k = 1.380649e-23;
@@ -55,7 +41,8 @@ float BandRadiance::slope_at(float celsius) const {
   return (at(celsius + 0.5F) - at(celsius - 0.5F));
 }
 
-ThermalCamera::ThermalCamera(ThermalConfig config, std::uint64_t seed) : config_(std::move(config)), seed_(seed) {
+ThermalCamera::ThermalCamera(ThermalConfig config, std::uint64_t seed)
+    : config_(std::move(config)), seed_(seed), lag_(config_.camera, config_.time_constant, config_.row_time) {
   const CameraModel& m = config_.camera;
   const auto size = static_cast<std::size_t>(m.width) * static_cast<std::size_t>(m.height);
   const int tiles_across = (m.width + kTile - 1) / kTile;
@@ -245,60 +232,6 @@ void ThermalCamera::resample_edges(const RayCaster& caster, const Atmosphere& at
   if (waiting > 0) flush();
 }
 
-// What a pixel showed a moment ago is now where the image motion carried it: an exponential trail along the flow.
-void ThermalCamera::lag(int row, const Vector6d& twist) {
-  const CameraModel& m = config_.camera;
-  const Eigen::Vector3f v = twist.head<3>().cast<float>();
-  const Eigen::Vector3f w = twist.tail<3>().cast<float>();
-  const auto scale_x = static_cast<float>(config_.time_constant * m.fx);
-  const auto scale_y = static_cast<float>(config_.time_constant * m.fy);
-  const auto last_x = static_cast<float>(m.width) - 1.001F;
-  const auto last_y = static_cast<float>(m.height) - 1.001F;
-  constexpr int kBlock = 64;
-  std::array<float, kBlock> trail_x, trail_y;
-  for (int begin = 0; begin < m.width; begin += kBlock) {
-    const int count = std::min(kBlock, m.width - begin);
-    const std::size_t first = row_begin(row) + static_cast<std::size_t>(begin);
-    for (int k = 0; k < count; ++k) {
-      const std::size_t i = first + static_cast<std::size_t>(k);
-      const float x = plane_x_[i], y = plane_y_[i];
-      const float depth = ray_z_[i] * (range_[i] > 0.0F ? range_[i] : 1e4F);
-      const float near = 1.0F / depth;
-      // Velocity of the point (x, y, 1) * depth in the camera's frame, over depth.
-      const float ax = -v.x() * near - (w.y() - w.z() * y);
-      const float ay = -v.y() * near - (w.z() * x - w.x());
-      const float az = -v.z() * near - (w.x() * y - w.y() * x);
-      trail_x[static_cast<std::size_t>(k)] = scale_x * (ax - x * az);
-      trail_y[static_cast<std::size_t>(k)] = scale_y * (ay - y * az);
-    }
-    for (int k = 0; k < count; ++k) {
-      const std::size_t i = first + static_cast<std::size_t>(k);
-      const float tx = trail_x[static_cast<std::size_t>(k)], ty = trail_y[static_cast<std::size_t>(k)];
-      const float length = std::min(60.0F, std::sqrt(tx * tx + ty * ty));
-      if (length < 0.25F) {
-        work_[i] = radiance_image_[i];
-        continue;
-      }
-      const int taps = std::clamp(static_cast<int>(1.5F * length) + 1, 2, kMostTaps);
-      float sum = 0.0F;
-      for (int n = 0; n < taps; ++n) {
-        const float age = kAges.of[static_cast<std::size_t>(taps)][static_cast<std::size_t>(n)];
-        const float px = std::clamp(static_cast<float>(begin + k) + age * tx, 0.0F, last_x);
-        const float py = std::clamp(static_cast<float>(row) + age * ty, 0.0F, last_y);
-        const int ix = static_cast<int>(px);
-        const int iy = static_cast<int>(py);
-        const float fx = px - static_cast<float>(ix);
-        const float fy = py - static_cast<float>(iy);
-        const float* a = radiance_image_.data() + iy * m.width + ix;
-        const float top = a[0] + fx * (a[1] - a[0]);
-        const float bottom = a[m.width] + fx * (a[m.width + 1] - a[m.width]);
-        sum += top + fy * (bottom - top);
-      }
-      work_[i] = sum / static_cast<float>(taps);
-    }
-  }
-}
-
 // Separable Gaussian from work_ back into work_, by way of radiance_image_.
 void ThermalCamera::optics(int threads) {
   const CameraModel& m = config_.camera;
@@ -414,11 +347,10 @@ void ThermalCamera::capture(const RayCaster& caster, const Atmosphere& atmospher
   parallel_for(threads, static_cast<std::size_t>(m.height),
                [&](std::size_t y) { resample_edges(caster, around, static_cast<int>(y)); });
   if (config_.time_constant > 0.0) {
-    constexpr double dt = 1e-3;
-    const double middle = time + half_readout();
-    const Pose before = pose(std::max(0.0, middle - dt));
-    const Vector6d twist = se3_log(before.inverse() * pose(middle + dt)) / (middle + dt - std::max(0.0, middle - dt));
-    parallel_for(threads, static_cast<std::size_t>(m.height), [&](std::size_t y) { lag(static_cast<int>(y), twist); });
+    lag_.begin(pose, time);
+    parallel_for(threads, static_cast<std::size_t>(m.height), [&](std::size_t y) {
+      lag_.apply(static_cast<int>(y), {plane_x_, plane_y_, ray_z_}, range_, radiance_image_, work_);
+    });
   } else {
     work_ = radiance_image_;
   }

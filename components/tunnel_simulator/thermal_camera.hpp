@@ -10,6 +10,7 @@
 #include "components/geometry/se3.hpp"
 #include "components/tunnel_simulator/atmosphere.hpp"
 #include "components/tunnel_simulator/camera_model.hpp"
+#include "components/tunnel_simulator/pixel_lag.hpp"
 #include "components/tunnel_simulator/ray_caster.hpp"
 
 namespace adit::tunnel_simulator {
@@ -88,7 +89,6 @@ class ThermalCamera {
   // `from`: where the packet's rays start, near enough for smoke.
   void shade(const RayCaster& caster, const Atmosphere& atmosphere, const RayPacket& packet,
              const Eigen::Vector3d& from, Pixels& out) const;
-  void lag(int row, const Vector6d& twist);
   void optics(int threads);
   void update_pattern(double time, int threads);
   void digitize(int row, double time, std::uint64_t frame, ThermalImage& image) const;
@@ -98,6 +98,7 @@ class ThermalCamera {
 
   ThermalConfig config_;
   std::uint64_t seed_;
+  PixelLag lag_;
   BandRadiance band_;
   float wall_celsius_ = 10.0F, air_radiance_ = 0.0F, sky_radiance_ = 0.0F, wall_radiance_ = 0.0F;
   std::vector<TileRays> tiles_;                   // row by row
