@@ -29,7 +29,7 @@ class DepthAnchor {
     float max_range = 80.0F;
     float radius = 8.0F;  // px, search window
     int min_points = 4;
-    float max_residual = 0.05F;  // of the inverse depth: larger is an edge
+    float max_residual = 0.03F;  // of the inverse depth: larger is an edge
     float range_sigma = 0.015F;  // m
     float relative_sigma = 0.003F;
   };

@@ -246,7 +246,7 @@ Initialiser::Outcome Initialiser::add(const Pyramid& image) {
       const Eigen::Vector2f p = warp.pixel(X);
       if (samplable(image.level(top), p.x(), p.y())) {
         scratch_.push_back(sample_value(image.level(top), p.x(), p.y()) -
-                           (warp.gain * look.intensity[4] + warp.offset));
+                           (warp.gain * look.intensity.mean() + warp.offset));
       }
     }
     if (!scratch_.empty()) state_.b += median(scratch_);

@@ -82,10 +82,12 @@ inline float sample_value(const Image& image, float x, float y) {
   return top + fy * (bottom - top);
 }
 
-// DSO's residual pattern: eight of the nine pixels of a diamond, so that one or two SIMD registers hold it.
+// The residual pattern: DSO's diamond without its centre instead of without one of its corners. Symmetric, because where
+// one image is blurrier than the other (further away) what is left of a gradient is a ramp across the pattern, and a
+// lopsided pattern takes that for a shift (measured: 0.1 px to one side at twice the distance).
 inline constexpr int pattern_size = 8;
-inline constexpr std::array<float, pattern_size> pattern_x{0, -1, 1, -2, 0, 2, -1, 0};
-inline constexpr std::array<float, pattern_size> pattern_y{-2, -1, -1, 0, 0, 0, 1, 2};
+inline constexpr std::array<float, pattern_size> pattern_x{0, -1, 1, -2, 2, -1, 1, 0};
+inline constexpr std::array<float, pattern_size> pattern_y{-2, -1, -1, 0, 0, 1, 1, 2};
 using Pattern = Eigen::Array<float, pattern_size, 1>;
 
 }  // namespace adit::thermal_odometry

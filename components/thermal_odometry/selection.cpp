@@ -6,18 +6,25 @@
 namespace adit::thermal_odometry {
 namespace {
 
-float gradient2(const Image& image, int x, int y) {
+Eigen::Vector2f gradient(const Image& image, int x, int y) {
   const float* p = image.row(y) + x;
-  const float gx = 0.5F * (p[1] - p[-1]);
-  const float gy = 0.5F * (p[image.width] - p[-image.width]);
-  return gx * gx + gy * gy;
+  return {0.5F * (p[1] - p[-1]), 0.5F * (p[image.width] - p[-image.width])};
+}
+
+// Of a grid with so many cells [px].
+int cell_size(int width, int height, int cells) {
+  return std::max(4,
+                  static_cast<int>(std::lround(std::sqrt(static_cast<double>(width) * height / std::max(1, cells)))));
 }
 
 }  // namespace
 
-PixelSelector::PixelSelector(int width, int height, const Config& config) : config_(config) {
-  cell_ = std::max(
-      4, static_cast<int>(std::lround(std::sqrt(static_cast<double>(width) * height / std::max(1, config.wanted)))));
+PixelSelector::PixelSelector(int width, int height, const Config& config)
+    : config_(config),
+      cell_(cell_size(width, height, config.wanted)),
+      texture_cell_(cell_size(width, height, texture_cells)),
+      texture_columns_(width / texture_cell_ + 1) {
+  texture_.resize(static_cast<std::size_t>(texture_columns_ * (height / texture_cell_ + 1)));
   selected_.reserve(static_cast<std::size_t>((width / cell_ + 1) * (height / cell_ + 1)));
   scratch_.reserve(static_cast<std::size_t>((width / 4 + 1) * (height / 4 + 1)));
 }
@@ -28,18 +35,18 @@ std::span<const Pixel> PixelSelector::select(const Pyramid& pyramid, const Recti
   const int border = config_.border;
   scratch_.clear();
   for (int y = border; y < image.height - border; y += 4) {
-    for (int x = border; x < image.width - border; x += 4) scratch_.push_back(gradient2(image, x, y));
+    for (int x = border; x < image.width - border; x += 4) scratch_.push_back(gradient(image, x, y).squaredNorm());
   }
   // Gradient magnitude of pure noise is Rayleigh distributed: its lower decile is 0.459 sigma.
   const auto decile = scratch_.begin() + static_cast<std::ptrdiff_t>(scratch_.size() / 10);
   std::nth_element(scratch_.begin(), decile, scratch_.end());
   threshold_ = std::max(config_.min_gradient, config_.noise_factor * std::sqrt(*decile) / 0.459F);
 
-  const float half_threshold2 = std::pow(std::max(config_.confirmation * threshold_, config_.min_confirmation), 2.0F);
-  const auto half_gradient2 = [&half](int x, int y) {
-    return gradient2(half, std::clamp(x / 2, 1, half.width - 2), std::clamp(y / 2, 1, half.height - 2));
+  const float half_threshold = std::max(config_.confirmation * threshold_, config_.min_confirmation);
+  const auto half_gradient = [&half](int x, int y) {
+    return gradient(half, std::clamp(x / 2, 1, half.width - 2), std::clamp(y / 2, 1, half.height - 2));
   };
-  strong_cells_ = 0;
+  std::fill(texture_.begin(), texture_.end(), std::uint8_t{0});
   selected_.clear();
   const float threshold2 = threshold_ * threshold_;
   for (int y0 = border; y0 < image.height - border; y0 += cell_) {
@@ -49,25 +56,27 @@ std::span<const Pixel> PixelSelector::select(const Pyramid& pyramid, const Recti
       float best = threshold2;
       int best_x = -1;
       int best_y = -1;
-      bool strong = false;
       for (int y = y0; y < y1; ++y) {
         for (int x = x0; x < x1; ++x) {
-          const float g2 = gradient2(image, x, y);
+          const Eigen::Vector2f g = gradient(image, x, y);
+          const float g2 = g.squaredNorm();
           if (g2 <= threshold2) continue;
-          const float coarse = half_gradient2(x, y);
-          strong = strong || coarse > config_.strong * config_.strong;
-          if (g2 > best && coarse > half_threshold2) {
+          const Eigen::Vector2f coarse = half_gradient(x, y);
+          if (coarse.squaredNorm() > config_.strong * config_.strong) {
+            texture_[static_cast<std::size_t>(y / texture_cell_ * texture_columns_ + x / texture_cell_)] = 1;
+          }
+          if (g2 > best && coarse.dot(g) > half_threshold * std::sqrt(g2)) {
             best = g2;
             best_x = x;
             best_y = y;
           }
         }
       }
-      strong_cells_ += strong ? 1 : 0;
       if (best_x < 0 || !rectifier.covered(best_x, best_y)) continue;
       selected_.push_back({static_cast<float>(best_x), static_cast<float>(best_y), std::sqrt(best)});
     }
   }
+  strong_cells_ = static_cast<int>(std::count(texture_.begin(), texture_.end(), std::uint8_t{1}));
   return selected_;
 }
 

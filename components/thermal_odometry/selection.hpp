@@ -1,6 +1,7 @@
 // Gradient-based pixel selection (paper R25; Engel et al., DSO, 2018, section 3.2, with the grid of LDSO).
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -18,27 +19,33 @@ struct Pixel {
 class PixelSelector {
  public:
   struct Config {
-    int wanted = 500;
-    float min_gradient = 0.5F;      // noise units a pixel
-    float noise_factor = 4.5F;      // times the gradient noise measured in the flattest tenth of the image
-    float confirmation = 0.7F;      // of the threshold, on level 1, and at least
-    float min_confirmation = 0.5F;  // noise units a level-1 pixel
-    float strong = 3.0F;            // level-1 gradient that noise and fixed patterns do not reach
-    int border = 8;                 // px
+    int wanted = 900;
+    float min_gradient = 0.5F;       // noise units a pixel
+    float noise_factor = 3.5F;       // times the gradient noise measured in the flattest tenth of the image
+    float confirmation = 0.7F;       // of the threshold, on level 1, and at least
+    float min_confirmation = 0.65F;  // noise units a level-1 pixel
+    float strong = 3.0F;             // level-1 gradient that noise and fixed patterns do not reach
+    int border = 8;                  // px
   };
   PixelSelector(int width, int height, const Config& config);
-  // The strongest gradient above the threshold in each grid cell that the next level confirms: a bad pixel or a grain
+  // The strongest gradient above the threshold in each grid cell that the next level confirms, with a gradient the same
+  // way: a bad pixel or a grain
   // of fixed-pattern noise has no gradient there. Rather few real points than many of noise: an image without texture
   // gives next to none. The span is valid until the next call.
   std::span<const Pixel> select(const Pyramid& pyramid, const Rectifier& rectifier);
   // Threshold the last call used.
   float threshold() const { return threshold_; }
-  // Grid cells of the last call that hold a strong gradient: the measure of whether there is anything to see.
+  // How many of texture_cells parts of the last image hold a strong gradient: the measure of whether there is anything
+  // to see.
+  static constexpr int texture_cells = 500;
   int strong_cells() const { return strong_cells_; }
 
  private:
   Config config_;
   int cell_;
+  int texture_cell_;
+  int texture_columns_;
+  std::vector<std::uint8_t> texture_;
   float threshold_ = 0.0F;
   int strong_cells_ = 0;
   std::vector<Pixel> selected_;

@@ -37,7 +37,7 @@ class ThermalOdometryComponent final : public Component {
 
   Param<Mode> mode_{*this, "mode", Mode::anchored, Choices<Mode>{{"anchored", Mode::anchored}, {"mono", Mode::mono}},
                     "metric by LiDAR depth, or the paper's monocular odometry"};
-  Param<std::int64_t> wanted_points_{*this, "points", 500, Range{50, 4000}, "pixels wanted at a keyframe"};
+  Param<std::int64_t> wanted_points_{*this, "points", 900, Range{50, 4000}, "pixels wanted at a keyframe"};
   Param<bool> bilateral_{*this, "bilateral", true, "smooth the image, keeping edges"};
   Param<double> usual_depth_{*this,       "usual_depth",      1.0,
                              Unit::metre, Range{0.01, 100.0}, "median depth a monocular map starts with: its scale"};

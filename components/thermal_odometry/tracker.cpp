@@ -168,7 +168,7 @@ double Tracker::median_offset(const Pyramid& pyramid, const CameraState& state, 
     const float px = static_cast<float>(camera.fx) * X.x() / X.z() + static_cast<float>(camera.cx);
     const float py = static_cast<float>(camera.fy) * X.y() / X.z() + static_cast<float>(camera.cy);
     if (!samplable(image, px, py)) continue;
-    scratch_.push_back(sample_value(image, px, py) - (relative.gain * templates[i].intensity[4] + relative.offset));
+    scratch_.push_back(sample_value(image, px, py) - (relative.gain * templates[i].intensity.mean() + relative.offset));
   }
   if (scratch_.empty()) return 0.0;
   const auto middle = scratch_.begin() + static_cast<std::ptrdiff_t>(scratch_.size() / 2);

@@ -10,6 +10,7 @@
 #include "components/thermal_odometry/front_end.hpp"
 #include "components/thermal_odometry/selection.hpp"
 #include "components/thermal_odometry/test_scene.hpp"
+#include "components/thermal_odometry/thermal_odometry.hpp"
 
 namespace adit::thermal_odometry {
 namespace {
@@ -143,7 +144,7 @@ TEST(Tracker, CovarianceIsConsistent) {
     const TrackResult result = bench.track(truth, TestScene::drive(0.7 * trial, 2.0));
     ASSERT_TRUE(result.ok);
     const Vector6d error = se3_log(result.state.T_cw * truth);
-    nees += error.dot(result.information / 10.0 * error) / trials;
+    nees += error.dot(result.information / Config{}.correlation * error) / trials;
   }
   EXPECT_GT(nees, 1.5);
   EXPECT_LT(nees, 12.0);
