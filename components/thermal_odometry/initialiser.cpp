@@ -60,6 +60,8 @@ void Initialiser::start(std::int64_t stamp_ns, Pyramid& image, std::span<const P
   }
   find_neighbours();
   state_ = {};
+  spin_.setZero();
+  last_ns_ = stamp_ns;
   velocity_.setZero();
   sigma_ = 2.0F;
   frames_ = 0;
@@ -128,17 +130,29 @@ Initialiser::System Initialiser::linearise(const Pyramid& pyramid, const CameraS
     system.inliers += point.good ? 1 : 0;
     const Eigen::Matrix<float, 2, 6> J = pixel_jacobian(warp.fx, warp.fy, view.x, view.y, point.d * view.rho);
     const Eigen::Vector2f Jd = view.by_depth(warp);
-    PatchBlock block = patch_block(view, J, Jd, w, r, -warp.gain * look.intensity);
-    elimination.c = block.coupling;
+    const PatchBlock block = patch_block(view, J, Jd, w, r, -warp.gain * look.intensity);
+    // How the states move the patch: rows that are read later are turned further.
+    Eigen::Matrix<float, states, 8> by = Eigen::Matrix<float, states, 8>::Identity();
+    if (warp.rolling) {
+      const float later = warp.row_time * (warp.fy * view.y + warp.cy - warp.middle_row);
+      by.block<3, 3>(8, 3) = later * Eigen::Matrix3f::Identity();
+    }
+    elimination.c.noalias() = by * block.coupling;
     point.hessian = block.depth_H;
     elimination.H = (elimination.H + point.hessian) * static_cast<float>(1.0 + damping);
     elimination.g += block.depth_g;
     const float inverse = 1.0F / elimination.H;
-    block.H.noalias() -= elimination.c * elimination.c.transpose() * inverse;
-    block.g.noalias() -= elimination.c * (elimination.g * inverse);
-    system.H += block.H.cast<double>();
-    system.g += block.g.cast<double>();
+    Eigen::Matrix<float, states, states> H = by * block.H * by.transpose();
+    H.noalias() -= elimination.c * elimination.c.transpose() * inverse;
+    Eigen::Matrix<float, states, 1> g = by * block.g;
+    g.noalias() -= elimination.c * (elimination.g * inverse);
+    system.H += H.cast<double>();
+    system.g += g.cast<double>();
   }
+  const double spin_information = 1.0 / (config_.spin_sigma * config_.spin_sigma);
+  system.H.diagonal().tail<3>().array() += spin_information;
+  system.g.tail<3>() += spin_information * spin_;
+  system.energy += spin_information * spin_.squaredNorm();
   const double gain_information = 1.0 / (0.05 * 0.05);
   system.H(6, 6) += gain_information;
   system.g[6] += gain_information * state.a;
@@ -147,15 +161,22 @@ Initialiser::System Initialiser::linearise(const Pyramid& pyramid, const CameraS
   return system;
 }
 
+// What the rows of a rolling readout are moved by: the motion since the frame before, turning by `spin_` more.
+void Initialiser::update_rate() {
+  if (camera_.row_time == 0.0) return;
+  state_.rate = se3_log(state_.T_cw * before_.inverse()) / dt_;
+  state_.rate.tail<3>() += spin_;
+}
+
 void Initialiser::refine(const Pyramid& image, int level, int iterations) {
   double lambda = 0.01;
   System system = linearise(image, state_, level, lambda);
   int rejected = 0;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    Matrix8 H = system.H;
+    Matrix H = system.H;
     H.diagonal() *= 1.0 + lambda;
     H.diagonal().array() += 1e-6;
-    const Vector8 step = -H.ldlt().solve(system.g);
+    const Vector step = -H.ldlt().solve(system.g);
     if (!step.allFinite() || step.head<6>().norm() > 2.0) return;
     backup_.clear();
     for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -167,9 +188,12 @@ void Initialiser::refine(const Pyramid& image, int level, int iterations) {
       point.d = std::clamp(point.d + std::clamp(change, -0.4F * point.d, 0.6F * point.d), 0.02F, 30.0F);
     }
     const CameraState before = state_;
+    const Eigen::Vector3d spin = spin_;
     state_.T_cw = se3_exp(step.head<6>()) * state_.T_cw;
     state_.a += step[6];
     state_.b += step[7];
+    spin_ += step.tail<3>();
+    update_rate();
     const System next = linearise(image, state_, level, lambda);
     if (next.energy < system.energy) {
       system = next;
@@ -178,6 +202,7 @@ void Initialiser::refine(const Pyramid& image, int level, int iterations) {
       if (step.head<6>().norm() < 1e-5) break;
     } else {
       state_ = before;
+      spin_ = spin;
       for (std::size_t i = 0; i < points_.size(); ++i) points_[i].d = backup_[i];
       lambda = std::min(1e3, 4.0 * lambda);
       if (++rejected >= 3) break;
@@ -228,11 +253,15 @@ void Initialiser::measure(const Pyramid& image) {
   parallax_ = scratch_.empty() ? 0.0F : median(scratch_);
 }
 
-Initialiser::Outcome Initialiser::add(const Pyramid& image) {
-  if (!active_) return Outcome::lost;
+Initialiser::Outcome Initialiser::add(std::int64_t stamp_ns, const Pyramid& image) {
+  if (!active_ || stamp_ns <= last_ns_) return Outcome::lost;
   ++frames_;
-  const CameraState before = state_;
-  state_.T_cw = se3_exp(velocity_) * state_.T_cw;
+  dt_ = 1e-9 * static_cast<double>(stamp_ns - last_ns_);
+  last_ns_ = stamp_ns;
+  before_ = state_.T_cw;
+  spin_.setZero();
+  state_.T_cw = se3_exp(velocity_ * dt_) * state_.T_cw;
+  update_rate();
   // The brightness offset first: a median is safe from anything the geometry does.
   {
     const int top = levels_ - 1;
@@ -253,7 +282,7 @@ Initialiser::Outcome Initialiser::add(const Pyramid& image) {
   }
   refine_from_the_top(image);
   measure(image);
-  velocity_ = se3_log(state_.T_cw * before.T_cw.inverse());
+  velocity_ = se3_log(state_.T_cw * before_.inverse()) / dt_;
   const bool finite = state_.T_cw.matrix().allFinite();
   const bool agree = finite && inlier_share_ > 0.4F && visible_share_ > 0.4F;
   if (!agree || parallax_ > config_.max_flow * static_cast<float>(width_)) return Outcome::lost;
@@ -278,6 +307,8 @@ bool Initialiser::beaten_by_a_rival(const Pyramid& image) {
     state_ = found;
     state_.T_cw = Pose::Identity();
     state_.T_cw.translation()[i / 2] = i % 2 == 0 ? -step : step;
+    spin_.setZero();
+    update_rate();
     for (Point& point : points_) point.d = point.anchor = 1.0F;
     refine_from_the_top(image);
     sigma_ = sigma;
@@ -287,6 +318,7 @@ bool Initialiser::beaten_by_a_rival(const Pyramid& image) {
     beaten = true;
   }
   state_ = best_.state;
+  spin_ = best_.spin;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     points_[i].d = best_.depths[i];
     points_[i].anchor = best_.anchors[i];
@@ -297,6 +329,7 @@ bool Initialiser::beaten_by_a_rival(const Pyramid& image) {
 
 void Initialiser::store(const Pyramid& image, Solution& out) {
   out.state = state_;
+  out.spin = spin_;
   out.energy = linearise(image, state_, 0, 0.0).energy;
   out.depths.clear();
   out.anchors.clear();

@@ -19,6 +19,7 @@ class Initialiser {
     float min_sigma = 0.5F;
     float max_sigma = 8.0F;
     double coupling = 3.0;       // of a depth to its neighbours' median
+    double spin_sigma = 0.3;     // rad/s, of the turn during a rolling readout about the mean since the last frame
     float min_parallax = 0.02F;  // of the image width, median translational flow
     float max_flow = 0.25F;      // of the image width: start over from a newer first view
     int min_frames = 4;
@@ -35,9 +36,9 @@ class Initialiser {
   void stop() { active_ = false; }
 
   enum class Outcome { waiting, done, lost };
-  // Aligns one more frame to the first view. `done`: parallax, residuals and depths are good enough to build a map, and
-  // no other direction of travel explains the pixels better.
-  Outcome add(const Pyramid& image);
+  // Aligns one more frame, later than the last one, to the first view. `done`: parallax, residuals and depths are good
+  // enough to build a map, and no other direction of travel explains the pixels better.
+  Outcome add(std::int64_t stamp_ns, const Pyramid& image);
 
   std::int64_t stamp_ns() const { return stamp_ns_; }
   Pyramid& first_image() { return first_; }
@@ -59,17 +60,20 @@ class Initialiser {
     bool good = false;
     std::array<int, neighbours> near{};
   };
-  using Matrix8 = Eigen::Matrix<double, 8, 8>;
-  using Vector8 = Eigen::Matrix<double, 8, 1>;
+  // [translation, rotation, a, b, spin]: the last is what a rolling readout turns beyond the mean rate [rad/s].
+  static constexpr int states = 11;
+  using Matrix = Eigen::Matrix<double, states, states>;
+  using Vector = Eigen::Matrix<double, states, 1>;
   struct System {
-    Matrix8 H;
-    Vector8 g;
+    Matrix H;
+    Vector g;
     double energy = 0.0;
     double scale = 0.0;
     int residuals = 0;
     int inliers = 0;
   };
   System linearise(const Pyramid& image, const CameraState& state, int level, double damping);
+  void update_rate();
   void refine(const Pyramid& image, int level, int iterations);
   void refine_from_the_top(const Pyramid& image);
   void lean_on_neighbours();
@@ -77,6 +81,7 @@ class Initialiser {
   void measure(const Pyramid& image);
   struct Solution {
     CameraState state;
+    Eigen::Vector3d spin;
     std::vector<float> depths;
     std::vector<float> anchors;
     double energy = 0.0;
@@ -93,7 +98,11 @@ class Initialiser {
   std::int64_t stamp_ns_ = 0;
   Pyramid first_;
   CameraState state_;
-  Vector6d velocity_ = Vector6d::Zero();
+  Eigen::Vector3d spin_ = Eigen::Vector3d::Zero();
+  Pose before_ = Pose::Identity();  // T_cw of the frame before
+  double dt_ = 0.0;                 // s since then
+  std::int64_t last_ns_ = 0;
+  Vector6d velocity_ = Vector6d::Zero();  // left twist of T_cw [1/s]
   float sigma_ = 2.0F;
   float parallax_ = 0.0F;
   float inlier_share_ = 0.0F;
@@ -106,7 +115,7 @@ class Initialiser {
   struct Elimination {
     float H = 0.0F;
     float g = 0.0F;
-    Eigen::Matrix<float, 8, 1> c = Eigen::Matrix<float, 8, 1>::Zero();
+    Eigen::Matrix<float, states, 1> c = Eigen::Matrix<float, states, 1>::Zero();
   };
   std::vector<Elimination> eliminations_;
   std::vector<Patch> patches_;

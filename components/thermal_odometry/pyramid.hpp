@@ -82,9 +82,9 @@ inline float sample_value(const Image& image, float x, float y) {
   return top + fy * (bottom - top);
 }
 
-// The residual pattern: DSO's diamond without its centre instead of without one of its corners. Symmetric, because where
-// one image is blurrier than the other (further away) what is left of a gradient is a ramp across the pattern, and a
-// lopsided pattern takes that for a shift (measured: 0.1 px to one side at twice the distance).
+// The residual pattern: DSO's diamond without its centre instead of without one of its corners. Symmetric, because
+// where one image is blurrier than the other (further away) what is left of a gradient is a ramp across the pattern,
+// and a lopsided pattern takes that for a shift (measured: 0.1 px to one side at twice the distance).
 inline constexpr int pattern_size = 8;
 inline constexpr std::array<float, pattern_size> pattern_x{0, -1, 1, -2, 2, -1, 1, 0};
 inline constexpr std::array<float, pattern_size> pattern_y{-2, -1, -1, 0, 0, 1, 1, 2};

@@ -142,7 +142,7 @@ class ThermalOdometry::Engine {
       initialiser_->stop();
     last_frame_ns_ = stamp_ns;
     if (initialiser_->active()) {
-      const Initialiser::Outcome outcome = initialiser_->add(current_);
+      const Initialiser::Outcome outcome = initialiser_->add(stamp_ns, current_);
       out_.residual = initialiser_->sigma();
       out_.inlier_share = initialiser_->inlier_share();
       if (outcome == Initialiser::Outcome::waiting) return;
@@ -177,6 +177,7 @@ class ThermalOdometry::Engine {
     const CameraState first{aligner_.T_cw(), 0.0, 0.0};
     CameraState second = initialiser_->state();
     second.T_cw.translation() /= static_cast<double>(factor);
+    second.rate.head<3>() /= static_cast<double>(factor);
     second.T_cw = second.T_cw * first.T_cw;
     const Mapper::Report report =
         mapper_.start(initialiser_->stamp_ns(), first, initialiser_->first_image(), patches, stamp_ns, second, current_,

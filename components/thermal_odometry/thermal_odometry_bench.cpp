@@ -82,6 +82,7 @@ void frames(benchmark::State& state, Mode mode, int points, bool bilateral) {
     auto odometry = ThermalOdometry::create(camera, config);
     std::vector<double> tracked, tracking, keyframes;
     double used = 0.0;
+    int later_keyframes = 0;  // after the first second, in which the map is begun
     for (int i = 0; i < Drive::count; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const auto stamp = static_cast<std::int64_t>(1e9 * Drive::period * i);
@@ -98,6 +99,7 @@ void frames(benchmark::State& state, Mode mode, int points, bool bilateral) {
       (estimate.new_keyframe ? keyframes : tracked).push_back(middle - begin);
       if (!estimate.new_keyframe) tracking.push_back(middle - begin - front_ms);
       used += estimate.points;
+      later_keyframes += estimate.new_keyframe && Drive::period * i >= 1.0 ? 1 : 0;
     }
     const std::size_t measured = tracked.size() + keyframes.size();
     state.counters["tracked_ms"] = mean(tracked);
@@ -107,6 +109,7 @@ void frames(benchmark::State& state, Mode mode, int points, bool bilateral) {
     state.counters["keyframe_ms"] = mean(keyframes);
     state.counters["keyframe_max_ms"] = quantile(keyframes, 1.0);
     state.counters["keyframes_per_s"] = static_cast<double>(keyframes.size()) / (Drive::period * Drive::count);
+    state.counters["later_keyframes_per_s"] = later_keyframes / (Drive::period * Drive::count - 1.0);
     state.counters["points"] = used / static_cast<double>(std::max<std::size_t>(1, measured));
     state.counters["measured"] = static_cast<double>(measured);
     state.counters["library_mb"] = resident_mb() - before_mb;
