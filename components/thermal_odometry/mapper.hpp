@@ -53,8 +53,10 @@ class Mapper {
     float sigma = 0.0F;
   };
   bool textured() const { return selector_.strong_cells() >= config_.min_texture; }  // of the image last selected from
+  // Pixels to begin a map from by motion alone.
   std::span<const Pixel> select(const Pyramid& image, const Rectifier& rectifier) {
-    return selector_.select(image, rectifier);
+    selector_.select(image, rectifier);
+    return selector_.clear_ones();
   }
 
   // Makes the image a keyframe and swaps it away. With `lidar` off clouds are ignored (mode mono). `scaled`: the map is

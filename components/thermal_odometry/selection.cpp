@@ -26,6 +26,7 @@ PixelSelector::PixelSelector(int width, int height, const Config& config)
       texture_columns_(width / texture_cell_ + 1) {
   texture_.resize(static_cast<std::size_t>(texture_columns_ * (height / texture_cell_ + 1)));
   selected_.reserve(static_cast<std::size_t>((width / cell_ + 1) * (height / cell_ + 1)));
+  clear_.reserve(selected_.capacity());
   scratch_.reserve(static_cast<std::size_t>((width / 4 + 1) * (height / 4 + 1)));
 }
 
@@ -78,6 +79,14 @@ std::span<const Pixel> PixelSelector::select(const Pyramid& pyramid, const Recti
   }
   strong_cells_ = static_cast<int>(std::count(texture_.begin(), texture_.end(), std::uint8_t{1}));
   return selected_;
+}
+
+std::span<const Pixel> PixelSelector::clear_ones() {
+  clear_.clear();
+  for (const Pixel& pixel : selected_) {
+    if (pixel.gradient > config_.clear * threshold_) clear_.push_back(pixel);
+  }
+  return clear_;
 }
 
 }  // namespace adit::thermal_odometry
