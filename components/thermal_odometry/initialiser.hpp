@@ -23,8 +23,8 @@ class Initialiser {
     float min_parallax = 0.02F;  // of the image width, median translational flow
     float max_flow = 0.25F;      // of the image width: start over from a newer first view
     int min_frames = 4;
-    float min_inlier_share =
-        0.75F;  // measured: 0.70 to 0.74 where a forecourt gave a false map, 0.78 to 0.93 in tunnels
+    // Measured: 0.70 to 0.74 where a forecourt gave a false map, 0.78 to 0.93 in tunnels.
+    float min_inlier_share = 0.75F;
     float max_relative_sigma = 0.15F;  // of a depth that is handed out
   };
   static constexpr int neighbours = 8;

@@ -29,10 +29,9 @@ class PixelSelector {
     int border = 8;                  // px
   };
   PixelSelector(int width, int height, const Config& config);
-  // The strongest gradient above the threshold in each grid cell that the next level confirms, with a gradient the same
-  // way: a bad pixel or a grain
-  // of fixed-pattern noise has no gradient there. Rather few real points than many of noise: an image without texture
-  // gives next to none. The span is valid until the next call.
+  // The strongest gradient above the threshold in each grid cell that the next level confirms, by one of the same
+  // direction: a bad pixel or a grain of fixed-pattern noise has no gradient there. Rather few real points than many of
+  // noise: an image without texture gives next to none. The span is valid until the next call.
   std::span<const Pixel> select(const Pyramid& pyramid, const Rectifier& rectifier);
   // Those of the last call with a gradient clear enough to get a depth from motion alone. Valid until the next call.
   std::span<const Pixel> clear_ones();
